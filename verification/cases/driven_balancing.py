@@ -363,7 +363,7 @@ def _estimate_imbalance(
     settings = filter_settings(scene)._replace(step=scene.sensor.step, laboratory=False)
     masses = PlantParameters.of(scene).moment * np.sum(np.exp(1j * np.array(scene.masses.initial_angle)))
     return imbalance_history(
-        imbalance_filter(settings, speed=record.speed),
+        imbalance_filter(settings, speeds=record.speed),
         samples=record.samples,
         variance=scale**2 * np.repeat([keys.position_noise**2, keys.velocity_noise**2], 2),
         masses=locked_masses(complex(masses)),

@@ -21,15 +21,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import expm
 
-from ringbalance.scene.arrays import FloatArray, Record, Records
-from ringbalance.scene.platform.compiled import compiled, in_place
+from ringbalance.scene.arrays import ComplexArray, FloatArray, Record
+from ringbalance.scene.platform.compiled import in_place
 
 Numbers = Sequence[float] | FloatArray
-
-_GAUSS_POINTS: FloatArray
-_GAUSS_WEIGHTS: FloatArray
-_GAUSS_POINTS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 class WhirlModel(NamedTuple):
@@ -75,146 +72,121 @@ class FilterSettings(NamedTuple):
     """True for the paper's transition in place of the exact one."""
 
 
+PLATEAU_FRACTION: Final = 0.01
+"""Largest distance of a measured speed from a plateau whose matrices it takes, as a fraction of its speed."""
+
+
+class FilterConstants(NamedTuple):
+    """Matrices F, Q and H of one filter step at each speed that the rotor keeps, the plateaus of its profile.
+
+    The model holds at constant speed only, so that no other speed needs matrices.  A measured speed takes
+    those of the nearest plateau; farther than `PLATEAU_FRACTION` from all of them the filter waits.  A speed
+    that is off by a fraction d changes the estimate by d |d ln alpha / d ln W| of itself, 2 d far below the
+    critical speed, which the correction by measured vibration removes.
+    """
+
+    start: tuple[float, float, float]
+    """Standard deviations before the first sample of displacement, m, velocity, m/s, and imbalance, kg m."""
+    step: float
+    """Time between two samples, s."""
+    speed: FloatArray
+    """W of the plateaus, rad/s, shape (n,)."""
+    transition: FloatArray
+    """F, to the state one step later, shape (n, 6, 6)."""
+    process: FloatArray
+    """Q, covariance of the process noise of one step, shape (n, 6, 6)."""
+    observation: FloatArray
+    """H, from the state to a sample without noise, shape (n, 4, 6)."""
+
+
 IMBALANCE_FILTER: Final = np.dtype(
     [
         ("state", np.float64, (6,)),  # z, v and the imbalance along x and y; v is z' while the masses rest
         ("covariance", np.float64, (6, 6)),
-        ("speed", np.float64),  # W that the matrices belong to, rad/s
-        ("transition", np.float64, (6, 6)),  # to the state one step later
-        ("process", np.float64, (6, 6)),  # covariance of the process noise of one step
-        ("observation", np.float64, (4, 6)),  # matrix from state to noise-free sample
+        ("plateau", np.int64),  # index of the matrices in use; -1 for none
         ("half", np.float64, (6, 6)),  # workspace for products
         ("cross", np.float64, (6,)),
     ]
 )
-"""Estimate, and the matrices of one step of the filter."""
+"""Estimate of the filter."""
 
 
-@compiled
-def _write_transition(model: WhirlModel, angular_velocity: float, step: float, out: FloatArray) -> None:
-    """Write the exact transition over one step, exp(A dt), in closed form.
+def _generator(model: WhirlModel, speed: float) -> ComplexArray:
+    """A of (z, v, theta)' = A (z, v, theta), shape (3, 3).
 
-    The deviation from the steady whirl is a free oscillation in the fixed frame, transformed to the rotor's
-    frame; the imbalance sets the steady whirl.
-    Source: solution of Eq. 13 of the paper on eccentric masses.
+    Source: Eq. 13 of the paper on eccentric masses.
     """
-    mass, damping, stiffness = model
-    w = angular_velocity
-    half, square = damping / (2 * mass), stiffness / mass
-    root = cmath.sqrt(complex(square - half * half, 0.0))
-    angle = root * step
-    small = abs(angle) < 1e-4
-    sine = step * (1 - angle * angle / 6) if small else cmath.sin(angle) / root
-    decay = math.exp(-half * step)
-    s, c = decay * sine.real, decay * cmath.cos(angle).real
-    # To Z = z exp(j W t), Z' = (z' + j W z) exp(j W t) and back, around one step of the oscillator.
-    turn = cmath.exp(complex(0.0, -w * step))
-    e00 = turn * complex(c + half * s, w * s)
-    e01 = turn * s
-    e10 = turn * s * complex(w * w - square, -2 * w * half)
-    e11 = turn * complex(c - half * s, -w * s)
-    gain = w * w / complex(stiffness - mass * w * w, damping * w)
-    blocks = ((e00, e01, (1 - e00) * gain), (e10, e11, -e10 * gain))
-    _write_identity(out)
-    for i in range(2):
-        for k in range(3):
-            value = blocks[i][k]
-            out[2 * i, 2 * k] = out[2 * i + 1, 2 * k + 1] = value.real
-            out[2 * i, 2 * k + 1] = -value.imag
-            out[2 * i + 1, 2 * k] = value.imag
+    (mass, damping, stiffness), w = model, speed
+    pull = w * w - (stiffness + 1j * damping * w) / mass
+    return np.array([[0, 1, 0], [pull, -damping / mass - 2j * w, w * w / mass], [0, 0, 0]])
 
 
-def whirl_transition(model: WhirlModel, angular_velocity: float, step: float) -> FloatArray:
+def _along_axes(matrix: ComplexArray) -> FloatArray:
+    """Matrix of x and y in place of x + j y."""
+    return np.kron(matrix.real, np.eye(2)) + np.kron(matrix.imag, [[0.0, -1.0], [1.0, 0.0]])
+
+
+def whirl_transition(model: WhirlModel, speed: float, step: float) -> FloatArray:
     """Exact transition exp(A dt) of the filter's state, shape (6, 6)."""
-    out = np.empty((6, 6))
-    _write_transition(model, angular_velocity, step, out)
-    return out
+    return _along_axes(expm(_generator(model, speed) * step))
 
 
-@in_place
-def _write_identity(out: FloatArray) -> None:
-    for i in range(out.shape[0]):
-        for k in range(6):
-            out[i, k] = 1.0 if i == k else 0.0
+def imbalance_filter(settings: FilterSettings, *, speeds: npt.ArrayLike) -> FilterConstants:
+    """Matrices of a filter at the speeds of the plateaus, rad/s, shape (n,).
 
-
-@compiled
-def _write_process(settings: FilterSettings, angular_velocity: float, out: FloatArray) -> None:
-    """Write the covariance that white noise builds up within one step, positive semidefinite.
-
-    Integral of E(s) diag(0, 0, q_a, q_a, q_m, q_m) E(s)^T over 0 to dt, by eight Gauss points.
-    Source: Van Loan, "Computing integrals involving the matrix exponential", IEEE Trans. Automat. Contr. 23
-    (1978), whose integral this is; in place of the paper's diag(O randn), which is no covariance.
-    """
-    part, half, grown, step = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros((6, 6)), settings.step
-    for i in range(6):
-        for k in range(6):
-            out[i, k] = 0.0
-    for point in range(_GAUSS_POINTS.size):
-        time = 0.5 * step * (1.0 + _GAUSS_POINTS[point])
-        _write_transition(settings.model, angular_velocity, time, part)
-        # Element by element, here and below: numba takes ten times as long to compile array expressions.
-        for i in range(6):
-            for k in range(6):
-                grown[i, k] = 0.0
-        grown[2, 2] = grown[3, 3] = settings.acceleration_noise
-        grown[4, 4] = grown[5, 5] = settings.imbalance_noise
-        _sandwich(part, grown, half)
-        for i in range(6):
-            for k in range(6):
-                out[i, k] += 0.5 * step * _GAUSS_WEIGHTS[point] * grown[i, k]
-
-
-@in_place
-def _sandwich(a: FloatArray, p: FloatArray, half: FloatArray) -> None:
-    """P <- A P A^T, symmetric to the last bit, in plain loops: at this size a library call does not pay."""
-    for i in range(6):
-        for k in range(6):
-            half[i, k] = 0.0
-        for j in range(6):
-            for k in range(6):
-                half[i, k] += a[i, j] * p[j, k]
-    for i in range(6):
-        for j in range(i + 1):
-            total = 0.0
-            for k in range(6):
-                total += half[i, k] * a[j, k]
-            p[i, j] = p[j, i] = total
-
-
-@compiled
-def set_speed(estimate: Record, settings: FilterSettings, speed: float) -> None:
-    """Write the matrices at a speed, rad/s, into an element of type `IMBALANCE_FILTER`.
-
+    With A of the whirl and S = diag(0, q_a, q_m), exp([[-A, S], [0, A^H]] dt) holds F^H at lower right and
+    F^-1 Q at upper right.  F^-1 grows with the damping; a long step is therefore halved k times, and
+    Q(2 dt) = F Q F^H + Q leads back.  The paper's transition I + A dt has an exact steady whirl but not an
+    exact transient; its process noise diag(O randn) is no covariance.
     A space-fixed sensor measures Z' = (z' + j W z) exp(j W t); turned back by the rotor's angle, which leaves
     the noise unchanged, this is z' + j W z.  A rotor-fixed sensor measures z'.
-    Source: Eq. 17 of the paper on eccentric masses, corrected: its printed last row contains the imbalance,
-        which the velocity does not depend on.
+    Source: Van Loan, "Computing integrals involving the matrix exponential", IEEE Trans. Automat. Contr. 23
+    (1978); Eqs. 14 and 17 of the paper on eccentric masses, the latter without the imbalance in its printed
+    last row, on which the velocity does not depend.
     """
-    estimate.speed = speed
-    if settings.euler:
-        # Eq. 14 of the paper, I + A dt, whose steady whirl is exact but whose transient is not.
-        (mass, damping, stiffness), w = settings.model, speed
-        step, out = settings.step, estimate.transition
-        _write_identity(out)
-        out[0, 2] = out[1, 3] = step
-        out[2, 0] = out[3, 1] = (w * w - stiffness / mass) * step
-        out[2, 1], out[3, 0] = damping * w / mass * step, -damping * w / mass * step
-        out[2, 2] = out[3, 3] = 1.0 - damping / mass * step
-        out[2, 3], out[3, 2] = 2 * w * step, -2 * w * step
-        out[2, 4] = out[3, 5] = w * w / mass * step
-    else:
-        _write_transition(settings.model, speed, settings.step, estimate.transition)
-    _write_process(settings, speed, estimate.process)
-    _write_identity(estimate.observation)
-    if settings.laboratory:
-        estimate.observation[2, 1], estimate.observation[3, 0] = -speed, speed
+    plateaus = np.atleast_1d(np.asarray(speeds, dtype=np.float64))
+    count = plateaus.size
+    transition, process, observation = (
+        np.empty((count, 6, 6)),
+        np.empty((count, 6, 6)),
+        np.zeros((count, 4, 6)),
+    )
+    power, decay = (
+        np.diag([0.0, settings.acceleration_noise, settings.imbalance_noise]),
+        settings.model.damping,
+    )
+    halvings = max(math.ceil(math.log2(max(decay / settings.model.mass * settings.step, 1.0))), 0)
+    for i, w in enumerate(plateaus):
+        generator = _generator(settings.model, w)
+        block = np.block([[-generator, power], [np.zeros((3, 3)), generator.conj().T]])
+        exponential = expm(block * (settings.step / 2**halvings))
+        exact = exponential[3:, 3:].conj().T
+        noise = exact @ exponential[:3, 3:]
+        for _ in range(halvings):
+            exact, noise = exact @ exact, exact @ noise @ exact.conj().T + noise
+        transition[i] = _along_axes(np.eye(3) + generator * settings.step if settings.euler else exact)
+        process[i] = _along_axes(0.5 * (noise + noise.conj().T))
+        observation[i, range(4), range(4)] = 1.0
+        if settings.laboratory:
+            observation[i, 2, 1], observation[i, 3, 0] = -w, w
+    return FilterConstants(settings.start, settings.step, plateaus, transition, process, observation)
 
 
 @in_place
-def begin_whirl(estimate: Record, settings: FilterSettings) -> None:
+def plateau_at(constants: FilterConstants, speed: float) -> int:
+    """Index of the nearest plateau within `PLATEAU_FRACTION` of its speed, rad/s; -1 if there is none."""
+    nearest, least = -1, math.inf
+    for i in range(constants.speed.size):
+        away = abs(speed - constants.speed[i])
+        if away < least and away <= PLATEAU_FRACTION * abs(constants.speed[i]):
+            nearest, least = i, away
+    return nearest
+
+
+@in_place
+def begin_whirl(estimate: Record, constants: FilterConstants) -> None:
     """Write the state before the first sample: rotor at rest at its centre, imbalance as estimated before."""
-    position, velocity, _ = settings.start
+    position, velocity, _ = constants.start
     for i in range(4):
         estimate.state[i] = 0.0
         for k in range(6):
@@ -223,22 +195,14 @@ def begin_whirl(estimate: Record, settings: FilterSettings) -> None:
     estimate.covariance[2, 2] = estimate.covariance[3, 3] = velocity * velocity
 
 
-@compiled
-def begin_filter(estimate: Record, settings: FilterSettings, speed: float) -> None:
-    """Write the state before the first sample, at a speed, rad/s: rotor at rest at its centre, no imbalance.
+@in_place
+def begin_filter(estimate: Record, constants: FilterConstants) -> None:
+    """Write the state before the first sample: rotor at rest at its centre, no imbalance, first plateau.
 
     Args: `estimate`: an element of type `IMBALANCE_FILTER`, of zeros.
     """
-    begin_whirl(estimate, settings)
-    estimate.covariance[4, 4] = estimate.covariance[5, 5] = settings.start[2] * settings.start[2]
-    set_speed(estimate, settings, speed)
-
-
-def imbalance_filter(settings: FilterSettings, *, speed: float) -> Records:
-    """Filter before its first sample, type `IMBALANCE_FILTER`, shape (1,)."""
-    estimate = np.zeros(1, dtype=IMBALANCE_FILTER)
-    begin_filter(estimate[0], settings, speed)
-    return estimate
+    begin_whirl(estimate, constants)
+    estimate.covariance[4, 4] = estimate.covariance[5, 5] = constants.start[2] * constants.start[2]
 
 
 class MassInput(NamedTuple):
@@ -281,12 +245,13 @@ def encoder_covariance(moment: float, angle: Numbers, deviation: float) -> tuple
 
 
 @in_place
-def predict(estimate: Record, masses: MassInput) -> None:
+def predict(constants: FilterConstants, estimate: Record, masses: MassInput) -> None:
     """Predict the estimate over one step; half of the drift acts at its beginning, half at its end.
 
     Source: Eqs. 14 and 15 of the paper on eccentric masses, with the whole force of moving masses.
     """
-    x, a, p, (xx, xy, yy) = estimate.state, estimate.transition, estimate.covariance, masses.covariance
+    x, p, half, (xx, xy, yy) = estimate.state, estimate.covariance, estimate.half, masses.covariance
+    a, q = constants.transition[estimate.plateau], constants.process[estimate.plateau]
     drive = (
         x[0] - 0.5 * masses.drift.real,
         x[1] - 0.5 * masses.drift.imag,
@@ -301,10 +266,19 @@ def predict(estimate: Record, masses: MassInput) -> None:
             x[i] += a[i, k] * drive[k]
     x[0] -= 0.5 * masses.drift.real
     x[1] -= 0.5 * masses.drift.imag
-    _sandwich(a, p, estimate.half)
+    # P <- A P A^T + Q, symmetric to the last bit, in plain loops: at this size a library call does not pay.
     for i in range(6):
         for k in range(6):
-            p[i, k] += estimate.process[i, k]
+            half[i, k] = 0.0
+        for j in range(6):
+            for k in range(6):
+                half[i, k] += a[i, j] * p[j, k]
+    for i in range(6):
+        for k in range(i + 1):
+            total = q[i, k]
+            for j in range(6):
+                total += half[i, j] * a[k, j]
+            p[i, k] = p[k, i] = total
     for i in range(4):
         for k in range(4):
             p[i, k] += a[i, 4] * xx * a[k, 4]
@@ -316,7 +290,7 @@ def predict(estimate: Record, masses: MassInput) -> None:
 
 
 @in_place
-def correct(estimate: Record, sample: Numbers, variance: Numbers) -> float:
+def correct(constants: FilterConstants, estimate: Record, sample: Numbers, variance: Numbers) -> float:
     """Correct the estimate by one sample, channel by channel; return the normalised innovation squared.
 
     With a true model that square has a chi-square distribution with four degrees of freedom, independent of
@@ -329,7 +303,7 @@ def correct(estimate: Record, sample: Numbers, variance: Numbers) -> float:
     """
     state, p, cross, surprise = estimate.state, estimate.covariance, estimate.cross, 0.0
     for m in range(4):
-        h, r = estimate.observation[m], variance[m]
+        h, r = constants.observation[estimate.plateau, m], variance[m]
         innovation, total = sample[m], r
         for i in range(6):
             innovation -= h[i] * state[i]
@@ -368,25 +342,27 @@ def imbalance_deviation(covariance: FloatArray) -> float:
 
 
 def imbalance_history(
-    estimate: Records, *, samples: FloatArray, variance: FloatArray, masses: MassInput | None = None
+    constants: FilterConstants, *, samples: FloatArray, variance: FloatArray, masses: MassInput | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Run a filter over a record: for each sample, predict and then correct.
+    """Run a filter over a record at its first plateau: for each sample, predict and then correct.
 
-    Args: `estimate`: type `IMBALANCE_FILTER`, shape (1,), one step before the first sample; not changed.
     Returns: States, shape (n, 6), and covariances, shape (n, 6, 6), after each sample.
     Raises: ValueError: a rotor at rest, which shows no imbalance.
     Source: section 3.1 of the paper on eccentric masses.
     """
-    if estimate["speed"][0] == 0:
+    if constants.speed[0] == 0:
         raise ValueError("a rotor at rest shows no imbalance: the speed must not be zero")
     states, covariances = np.empty((len(samples), 6)), np.empty((len(samples), 6, 6))
-    seen = np.ascontiguousarray(samples, dtype=np.float64)
-    _history(estimate.copy()[0], seen, variance, masses or locked_masses(0.0j), states, covariances)
+    estimate = np.zeros(1, dtype=IMBALANCE_FILTER)[0]
+    begin_filter(estimate, constants)
+    measured = np.ascontiguousarray(samples, dtype=np.float64)
+    _history(constants, estimate, measured, variance, masses or locked_masses(0.0j), states, covariances)
     return states, covariances
 
 
 @in_place
 def _history(
+    constants: FilterConstants,
     estimate: Record,
     samples: FloatArray,
     variance: FloatArray,
@@ -395,8 +371,8 @@ def _history(
     covariances: FloatArray,
 ) -> None:
     for i in range(samples.shape[0]):
-        predict(estimate, masses)
-        correct(estimate, samples[i], variance)
+        predict(constants, estimate, masses)
+        correct(constants, estimate, samples[i], variance)
         for j in range(6):
             states[i, j] = estimate.state[j]
             for k in range(6):

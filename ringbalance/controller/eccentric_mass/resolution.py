@@ -44,7 +44,7 @@ def rotor_covariance(
     step = max(scene.imbalance_filter.step, duration / _MAX_STEPS)
     count = max(round(duration / step), 1)
     settings = filter_settings(scene)._replace(step=step, euler=False)
-    estimate, assumed = imbalance_filter(settings, speed=speed), scene.imbalance_filter
+    constants, assumed = imbalance_filter(settings, speeds=speed), scene.imbalance_filter
     variance = np.repeat([assumed.position_noise**2, assumed.velocity_noise**2], 2) * (assumed.step / step)
     masses = locked_masses(_initial_vector(scene))
 
@@ -59,8 +59,8 @@ def rotor_covariance(
         for i in range(count):
             state = transition @ state
             whirls[i] = state
-        samples = whirls @ estimate["observation"][0].T
-        states, _ = imbalance_history(estimate, samples=samples, variance=variance, masses=masses)
+        samples = whirls @ constants.observation[0].T
+        states, _ = imbalance_history(constants, samples=samples, variance=variance, masses=masses)
         return np.asarray(states[-1, 4:6])
 
     nominal = estimated(scene)

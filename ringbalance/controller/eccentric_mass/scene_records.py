@@ -58,6 +58,8 @@ from ringbalance.scene.kinds import (
 from ringbalance.scene.narrowing import scene_as
 from ringbalance.scene.origins import SceneFile
 
+STEADY_RAD_S2: Final = 1e-6
+"""Speed rate below which the speed counts as constant."""
 Frame = Literal["rotor", "laboratory"]
 
 
@@ -93,6 +95,14 @@ class EccentricRotor:
         """Times, s, and speeds, rad/s, of the corners of the speed profile."""
         times = np.array([corner.time for corner in self.speed_profile])
         return times, np.array([corner.speed for corner in self.speed_profile])
+
+    @property
+    def plateaus(self) -> FloatArray:
+        """Speeds that the profile keeps for a time, rad/s, each once, shape (n,)."""
+        times, speeds = self.profile
+        level = np.abs(np.diff(speeds)) < STEADY_RAD_S2 * np.diff(times)
+        first = speeds[:1] if times[0] > 0 else speeds[:0]
+        return np.unique(np.concatenate([first, speeds[:-1][level], speeds[1:][level], speeds[-1:]]))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,7 +18,11 @@ from ringbalance.controller.eccentric_mass.drive_law import (
     track_model,
 )
 from ringbalance.controller.eccentric_mass.friction_filter import FrictionNoise, TrackModel
-from ringbalance.controller.eccentric_mass.imbalance_filter import FilterSettings
+from ringbalance.controller.eccentric_mass.imbalance_filter import (
+    FilterConstants,
+    FilterSettings,
+    imbalance_filter,
+)
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.arrays import FloatArray
@@ -186,7 +190,7 @@ class StrategySettings(NamedTuple):
     """Samples for which a voltage is held."""
     law: DriveLaw
     gates: Gates
-    filter: FilterSettings
+    filter: FilterConstants
     sensor: _SensorSettings
     filter_every: int
     """Samples between two steps of the imbalance filter."""
@@ -204,7 +208,9 @@ class StrategySettings(NamedTuple):
             voltage_every=max(round(scene.lqr.step / sensor.step), 1),
             law=law,
             gates=Gates.of(scene, law),
-            filter=filter_settings(scene)._replace(step=sensor.step * every),
+            filter=imbalance_filter(
+                filter_settings(scene)._replace(step=sensor.step * every), speeds=scene.rotor.plateaus
+            ),
             sensor=_SensorSettings(
                 position=keys.position_noise,
                 velocity=keys.velocity_noise,

@@ -28,8 +28,8 @@ from ringbalance.controller.eccentric_mass.imbalance_filter import (
     encoder_covariance,
     imbalance_deviation,
     mass_vector,
+    plateau_at,
     predict,
-    set_speed,
 )
 from ringbalance.controller.eccentric_mass.memory import (
     FRICTION,
@@ -55,7 +55,7 @@ def begin_strategy(settings: StrategySettings, memory: Record, measurement: Ecce
 
     Args: `memory`: an element of type `MEMORY`, of zeros.
     """
-    begin_filter(memory.filter, settings.filter, measurement.speed)
+    begin_filter(memory.filter, settings.filter)
     memory.deviation = settings.filter.start[2]
     rate, arm = settings.friction.start
     for i in range(2):
@@ -97,8 +97,9 @@ def strategy_step(settings: StrategySettings, memory: Record, measurement: Eccen
     for i in range(2):
         memory.angle[i] += weight * (motion.angle[i] - memory.angle[i])
         memory.rate[i] += weight * (motion.rate[i] - memory.rate[i])
-    # The imbalance filter's model holds for a rotor at constant speed with slow masses.
-    turning = abs(motion.speed) >= settings.gates.lowest_speed and is_constant(motion)
+    # The imbalance filter's model holds for a rotor at the constant speed of a plateau with slow masses.
+    memory.filter.plateau = plateau_at(settings.filter, motion.speed) if is_constant(motion) else -1
+    turning = abs(motion.speed) >= settings.gates.lowest_speed and memory.filter.plateau >= 0
     fastest = max(abs(memory.rate[0]), abs(memory.rate[1]))
     visible = bool(turning and fastest * settings.step * settings.filter_every <= _LARGEST_STEP_ANGLE_RAD)
     if memory.stage == IMBALANCE and count % settings.filter_every == 0:
@@ -136,8 +137,6 @@ def _estimate_imbalance(
         return
     estimate, sensor, step = memory.filter, settings.sensor, settings.filter.step
     whirl, moment = settings.law.whirl, settings.law.track.moment
-    if estimate.speed != motion.speed:
-        set_speed(estimate, settings.filter, motion.speed)
     vector, vector_rate = mass_vector(moment, motion.angle, motion.rate)
     before, rate_before = memory.mass_vector, memory.mass_pace
     if memory.running == 0:
@@ -149,14 +148,14 @@ def _estimate_imbalance(
     noise = moment * sensor.rate * step / whirl.mass
     covariance = encoder_covariance(moment, motion.angle, sensor.angle)
     masses = MassInput(mean + damped * mean_rate, mean_rate * step / whirl.mass, covariance, noise * noise)
-    predict(estimate, masses)
+    predict(settings.filter, estimate, masses)
     position, velocity = sample[0], sample[1] + vector_rate / whirl.mass
     shown = (position.real, position.imag, velocity.real, velocity.imag)
     # The encoders' rates are in the velocities.
     xx, _, yy = encoder_covariance(moment, motion.angle, sensor.rate / whirl.mass)
     of_position, of_velocity = sensor.position**2, sensor.velocity**2
     variance = (of_position, of_position, of_velocity + xx, of_velocity + yy)
-    memory.surprise += correct(estimate, shown, variance)
+    memory.surprise += correct(settings.filter, estimate, shown, variance)
     memory.judged, memory.running = memory.judged + 1, 1
     memory.mass_vector, memory.mass_pace = vector, vector_rate
     memory.imbalance = complex(estimate.state[4], estimate.state[5])

@@ -41,6 +41,7 @@ from ringbalance.controller.eccentric_mass.memory import (
     WAITING,
     Pair,
 )
+from ringbalance.controller.eccentric_mass.scene_records import STEADY_RAD_S2
 from ringbalance.controller.eccentric_mass.settings import Gates
 from ringbalance.controller.eccentric_mass.targets import (
     aim_back,
@@ -69,8 +70,6 @@ _LEAST_DRIVE_TIME_S: Final = 1.0
 _LONGEST_MOVE_S: Final = 10.0
 _STILL_TIME_S: Final = 1.0
 """Time without approach to the goal after which masses count as held by friction."""
-_STEADY_RAD_S2: Final = 1e-6
-"""Speed rate below which the speed counts as constant."""
 
 
 @in_place
@@ -155,7 +154,7 @@ def _influence_of(law: DriveLaw, speed: float) -> complex:
 @in_place
 def is_constant(motion: Motion) -> bool:
     """Return True if the rotor's speed is constant."""
-    return abs(motion.speed_rate) < _STEADY_RAD_S2
+    return abs(motion.speed_rate) < STEADY_RAD_S2
 
 
 @in_place
@@ -172,7 +171,7 @@ def _imbalance(
         cause = IMBALANCE_UNCERTAIN
         if abs(motion.speed) < gates.lowest_speed:
             cause = TOO_SLOW
-        elif not is_constant(motion):
+        elif memory.filter.plateau < 0:
             cause = SPEED_NOT_CONSTANT
         elif not visible:
             cause = MASSES_MOVE

@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad_vec, solve_ivp
 from scipy.linalg import expm
 
 from ringbalance.controller.eccentric_mass.imbalance_filter import (
+    IMBALANCE_FILTER,
+    PLATEAU_FRACTION,
+    FilterConstants,
     FilterSettings,
     MassInput,
     WhirlModel,
+    begin_filter,
     correct,
     imbalance_deviation,
     imbalance_filter,
     imbalance_history,
     locked_masses,
     mass_vector,
+    plateau_at,
     predict,
     whirl_transition,
 )
-from ringbalance.scene.arrays import FloatArray, Records
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
+from ringbalance.controller.eccentric_mass.settings import StrategySettings, filter_settings
+from ringbalance.scene.arrays import FloatArray, Record
 
 MODEL = WhirlModel(5.36, 10.0, 1000.0)
 SPEED = 100 * math.pi / 30
@@ -61,29 +69,32 @@ def dynamic_stiffness(*, model: WhirlModel, angular_velocity: float) -> complex:
     return complex(model.stiffness - model.mass * w**2, model.damping * w)
 
 
-def begun(settings: FilterSettings = SETTINGS, speed: float = SPEED) -> Records:
-    return imbalance_filter(settings, speed=speed)
+def constants_of(settings: FilterSettings = SETTINGS, speed: float = SPEED) -> FilterConstants:
+    return imbalance_filter(settings, speeds=speed)
 
 
-def matrix(estimate: Records, name: str) -> FloatArray:
-    return np.asarray(estimate[name][0])
+def begun(constants: FilterConstants) -> Record:
+    """Estimate before its first sample."""
+    estimate = np.zeros(1, dtype=IMBALANCE_FILTER)[0]
+    begin_filter(estimate, constants)
+    return estimate
 
 
 def record(
     *, steps: int, seed: int, settings: FilterSettings, prior: bool = False
 ) -> tuple[FloatArray, FloatArray]:
     """States and samples drawn from the filter's own model; from its prior when asked."""
-    random, estimate = np.random.default_rng(seed), begun(settings)
+    random, constants = np.random.default_rng(seed), constants_of(settings)
     state = np.concatenate([np.zeros(4), TRUE])
     if prior:
-        state = random.multivariate_normal(np.zeros(6), matrix(estimate, "covariance"))
+        state = random.multivariate_normal(np.zeros(6), begun(constants)["covariance"])
     states, samples = np.zeros((steps, 6)), np.zeros((steps, 4))
     for i in range(steps):
         noisy = settings.acceleration_noise > 0
-        push = random.multivariate_normal(np.zeros(6), matrix(estimate, "process")) if noisy else 0.0
-        state = matrix(estimate, "transition") @ state + push
+        push = random.multivariate_normal(np.zeros(6), constants.process[0]) if noisy else 0.0
+        state = constants.transition[0] @ state + push
         states[i] = state
-        samples[i] = matrix(estimate, "observation") @ state + np.sqrt(VARIANCE) * random.standard_normal(4)
+        samples[i] = constants.observation[0] @ state + np.sqrt(VARIANCE) * random.standard_normal(4)
     return states, samples
 
 
@@ -94,8 +105,8 @@ def test_transition_is_the_matrix_exponential(model: WhirlModel, speed: float, s
     generator = whirl_generator(model=model, angular_velocity=speed)
     expected = expm(generator * step)
     np.testing.assert_allclose(whirl_transition(model, speed, step), expected, rtol=0, atol=1e-12)
-    euler = matrix(begun(SETTINGS._replace(model=model, step=step, euler=True), speed), "transition")
-    np.testing.assert_allclose(euler, np.eye(6) + generator * step, atol=1e-15)
+    euler = constants_of(SETTINGS._replace(model=model, step=step, euler=True), speed)
+    np.testing.assert_allclose(euler.transition[0], np.eye(6) + generator * step, atol=1e-15)
 
 
 def test_generator_is_the_whirls_equation() -> None:
@@ -109,14 +120,69 @@ def test_generator_is_the_whirls_equation() -> None:
     np.testing.assert_allclose(whirl_transition(MODEL, SPEED, 0.7) @ state, state, atol=1e-14)
 
 
-def test_process_covariance_is_van_loans() -> None:
-    generator = whirl_generator(model=MODEL, angular_velocity=SPEED)
+STIFF = WhirlModel(1.0, 4000.0, 9e4)
+"""Its fastest rate decays by a factor exp(-40) within 0.01 s."""
+
+
+@pytest.mark.parametrize("model", [*MODELS, STIFF])
+@pytest.mark.parametrize("speed", [0.0, SPEED, -7.0])
+@pytest.mark.parametrize("step", [1e-3, 0.01, 0.1])
+def test_process_covariance_is_the_integral(model: WhirlModel, speed: float, step: float) -> None:
+    """Integral of E(s) S E(s)^T by quadrature; each element to 1e-12 of its pair's deviations."""
+    generator = whirl_generator(model=model, angular_velocity=speed)
     power = np.diag([0, 0, 1e-3, 1e-3, 1e-8, 1e-8])
-    block = expm(np.block([[-generator, power], [np.zeros((6, 6)), generator.T]]) * 0.02)
-    expected = block[6:, 6:].T @ block[:6, 6:]
-    settings = SETTINGS._replace(acceleration_noise=1e-3, imbalance_noise=1e-8, step=0.02)
-    process = matrix(begun(settings), "process")
-    np.testing.assert_allclose(process, expected, rtol=1e-10, atol=1e-16)
+
+    def grown(time: float) -> FloatArray:
+        transition = expm(generator * time)
+        return np.asarray(transition @ power @ transition.T)
+
+    expected, _ = quad_vec(grown, 0.0, step, epsabs=0.0, epsrel=1e-14, limit=2000, norm="max")
+    settings = SETTINGS._replace(model=model, acceleration_noise=1e-3, imbalance_noise=1e-8, step=step)
+    process, deviation = constants_of(settings, speed).process[0], np.sqrt(np.diag(expected))
+    scale = np.outer(deviation, deviation)
+    np.testing.assert_allclose(process / scale, expected / scale, rtol=0, atol=1e-12)
+    assert np.array_equal(process, process.T)
+    assert np.min(np.linalg.eigvalsh(process / scale)) > -1e-15
+
+
+@pytest.mark.parametrize("model", [*MODELS, STIFF])
+@pytest.mark.parametrize("step", [1e-4, 0.01, 0.3])
+def test_two_steps_are_one_step_of_twice_the_length(model: WhirlModel, step: float) -> None:
+    """F(2 h) = F(h)^2 and Q(2 h) = F(h) Q(h) F(h)^T + Q(h)."""
+    short, long = (constants_of(SETTINGS._replace(model=model, step=each)) for each in (step, 2 * step))
+    transition, process = short.transition[0], short.process[0]
+    scale = np.sqrt(np.diag(long.process[0]))
+    np.testing.assert_allclose(long.transition[0], transition @ transition, rtol=0, atol=1e-12)
+    doubled = (transition @ process @ transition.T + process - long.process[0]) / np.outer(scale, scale)
+    np.testing.assert_allclose(doubled, 0.0, rtol=0, atol=1e-12)
+
+
+def test_every_plateau_has_its_own_matrices(scene: EccentricScene) -> None:
+    """A scene that keeps 60, 90 and 800 rpm; 300 rpm is a corner of two ramps, and gets none."""
+    rpm = math.pi / 30
+    corners = [(5.0, 60.0), (10.0, 90.0), (20.0, 90.0), (30.0, 300.0), (40.0, 800.0)]
+    profile = tuple(SpeedPoint(time=time, speed=speed * rpm) for time, speed in corners)
+    kept = replace(scene, rotor=replace(scene.rotor, speed_profile=profile))
+    constants = StrategySettings.of(kept).filter
+    np.testing.assert_allclose(constants.speed, [60 * rpm, 90 * rpm, 800 * rpm])
+    settings = filter_settings(kept)
+    for i, speed in enumerate(constants.speed):
+        alone = constants_of(settings, float(speed))
+        for name in ("transition", "process", "observation"):
+            np.testing.assert_array_equal(getattr(constants, name)[i], getattr(alone, name)[0])
+        np.testing.assert_allclose(
+            constants.transition[i],
+            expm(whirl_generator(model=settings.model, angular_velocity=speed) * settings.step),
+            rtol=0,
+            atol=1e-12,
+        )
+    near = 1 + 0.99 * PLATEAU_FRACTION
+    assert [plateau_at(constants, near * speed) for speed in constants.speed] == [0, 1, 2]
+    assert [plateau_at(constants, speed / near) for speed in constants.speed] == [0, 1, 2]
+    far = 1 + 1.01 * PLATEAU_FRACTION
+    assert [plateau_at(constants, far * speed) for speed in constants.speed] == [-1, -1, -1]
+    assert plateau_at(constants, -float(constants.speed[0])) == -1
+    assert plateau_at(constants_of(settings, 0.0), 0.0) == 0
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -126,21 +192,21 @@ def test_eulers_step_limit_is_where_its_eigenvalues_leave_the_unit_circle(
 ) -> None:
     limit = float(model.euler_step_limit(angular_velocity=speed))
     for share, grows in ((0.999, False), (1.001, True)):
-        euler = begun(SETTINGS._replace(model=model, step=share * limit, euler=True), speed)
-        radius = max(abs(np.linalg.eigvals(matrix(euler, "transition")[:4, :4])))
+        euler = constants_of(SETTINGS._replace(model=model, step=share * limit, euler=True), speed)
+        radius = max(abs(np.linalg.eigvals(euler.transition[0, :4, :4])))
         assert (radius > 1) == grows
 
 
 def test_covariance_history_is_the_information_filters() -> None:
     """Sums of inverses in place of gains: another arithmetic for the same numbers."""
-    estimate = begun()
+    constants = constants_of()
     _, samples = record(steps=60, seed=1, settings=SETTINGS)
-    states, covariances = imbalance_history(estimate, samples=samples, variance=VARIANCE)
-    transition, observation = matrix(estimate, "transition"), matrix(estimate, "observation")
-    state, covariance = matrix(estimate, "state"), matrix(estimate, "covariance")
+    states, covariances = imbalance_history(constants, samples=samples, variance=VARIANCE)
+    transition, observation = constants.transition[0], constants.observation[0]
+    state, covariance = begun(constants)["state"], begun(constants)["covariance"]
     for i in range(60):
         state = transition @ state
-        covariance = transition @ covariance @ transition.T + matrix(estimate, "process")
+        covariance = transition @ covariance @ transition.T + constants.process[0]
         information = np.linalg.inv(covariance)
         seen = information + observation.T @ (observation / VARIANCE[:, None])
         covariance = np.linalg.inv(seen)
@@ -151,11 +217,11 @@ def test_covariance_history_is_the_information_filters() -> None:
 
 def test_last_estimate_is_the_batch_least_squares_solution() -> None:
     """Without process noise all samples hang on the first state: one weighted least-squares problem."""
-    estimate = begun(QUIET)
+    constants = constants_of(QUIET)
     _, samples = record(steps=300, seed=2, settings=QUIET)
-    states, covariances = imbalance_history(estimate, samples=samples, variance=VARIANCE)
-    transition, observation = matrix(estimate, "transition"), matrix(estimate, "observation")
-    rows, power = [np.diag(1 / np.sqrt(np.diag(matrix(estimate, "covariance"))))], np.eye(6)
+    states, covariances = imbalance_history(constants, samples=samples, variance=VARIANCE)
+    transition, observation = constants.transition[0], constants.observation[0]
+    rows, power = [np.diag(1 / np.sqrt(np.diag(begun(constants)["covariance"])))], np.eye(6)
     sides = [np.zeros(6)]
     for sample in samples:
         power = transition @ power
@@ -174,7 +240,7 @@ def test_errors_are_as_large_as_the_covariance_says(laboratory: bool) -> None:
     runs, nees, settings = 60, [], SETTINGS._replace(laboratory=laboratory)
     for seed in range(runs):
         states, samples = record(steps=150, seed=seed, settings=settings, prior=True)
-        estimates, covariances = imbalance_history(begun(settings), samples=samples, variance=VARIANCE)
+        estimates, covariances = imbalance_history(constants_of(settings), samples=samples, variance=VARIANCE)
         error = states[-1] - estimates[-1]
         nees.append(error @ np.linalg.solve(covariances[-1], error))
     # Chi-squared of 6 degrees of freedom: standard deviation sqrt(12/60) of the mean; 4 of them.
@@ -182,11 +248,12 @@ def test_errors_are_as_large_as_the_covariance_says(laboratory: bool) -> None:
 
 
 def test_josephs_form_stays_symmetric_and_positive() -> None:
-    estimate = begun(QUIET)
+    constants = constants_of(QUIET)
+    estimate = begun(constants)
     for _ in range(200):
-        predict(estimate[0], locked_masses(0.0j))
-        correct(estimate[0], np.zeros(4), np.full(4, 1e-14))
-        covariance = matrix(estimate, "covariance")
+        predict(constants, estimate, locked_masses(0.0j))
+        correct(constants, estimate, np.zeros(4), np.full(4, 1e-14))
+        covariance = estimate["covariance"]
         assert np.array_equal(covariance, covariance.T)
         assert np.min(np.linalg.eigvalsh(covariance)) >= 0
 
@@ -199,8 +266,8 @@ def test_both_frames_know_the_imbalance() -> None:
     seen = v + 1j * SPEED * z
     outside = np.column_stack([z.real, z.imag, seen.real, seen.imag])
     for laboratory, samples in ((False, states[:, :4] + noise), (True, outside + noise)):
-        estimate = begun(SETTINGS._replace(laboratory=laboratory))
-        estimates, covariances = imbalance_history(estimate, samples=samples, variance=VARIANCE)
+        constants = constants_of(SETTINGS._replace(laboratory=laboratory))
+        estimates, covariances = imbalance_history(constants, samples=samples, variance=VARIANCE)
         error = np.hypot(*(estimates[-1, 4:] - TRUE))
         assert error < 4 * imbalance_deviation(covariances[-1])
         assert error < 2e-3 * np.hypot(*TRUE)
@@ -208,14 +275,14 @@ def test_both_frames_know_the_imbalance() -> None:
 
 def test_masses_that_are_not_opposite_are_taken_out() -> None:
     vector, _ = mass_vector(0.0414, (0.2, 2.9), (0.0, 0.0))
-    masses, estimate = np.array([vector.real, vector.imag]), begun(QUIET)
+    masses, constants = np.array([vector.real, vector.imag]), constants_of(QUIET)
     state, samples = np.concatenate([np.zeros(4), TRUE + masses]), []
     for _ in range(3000):
-        state = matrix(estimate, "transition") @ state
+        state = constants.transition[0] @ state
         samples.append(state[:4].copy())
     for assumed, expected in ((vector, TRUE), (0.0j, TRUE + masses)):
         estimates, _ = imbalance_history(
-            estimate, samples=np.array(samples), variance=VARIANCE, masses=locked_masses(assumed)
+            constants, samples=np.array(samples), variance=VARIANCE, masses=locked_masses(assumed)
         )
         np.testing.assert_allclose(estimates[-1, 4:], expected, rtol=1e-3)
 
@@ -239,7 +306,8 @@ def test_moving_masses_are_taken_out() -> None:
     run = solve_ivp(slope, (0, 3), [0j, 0j], t_eval=time, rtol=1e-10, atol=1e-13, method="DOP853")
     back = np.exp(-1j * SPEED * time)
     z, v = run.y[0] * back, (run.y[1] - 1j * SPEED * run.y[0]) * back
-    estimate = begun(QUIET)
+    constants = constants_of(QUIET)
+    estimate = begun(constants)
     before = mass_vector(moment, *angles(0.0))
     for i in range(1, time.size):
         now = mass_vector(moment, *angles(float(time[i])))
@@ -248,23 +316,24 @@ def test_moving_masses_are_taken_out() -> None:
         masses = MassInput(p + damped * pace, pace * STEP / MODEL.mass, (0.0, 0.0, 0.0), 0.0)
         seen = v[i] + now[1] / MODEL.mass
         sample = np.array([z[i].real, z[i].imag, seen.real, seen.imag])
-        predict(estimate[0], masses)
-        correct(estimate[0], sample, 1e-4 * VARIANCE)
+        predict(constants, estimate, masses)
+        correct(constants, estimate, sample, 1e-4 * VARIANCE)
         before = now
     # Of second order in the step: (3 rad/s * 1 ms)^2 of 0.04 kg m at most.
-    np.testing.assert_allclose(estimate["state"][0, 4:], TRUE, atol=4e-7)
+    np.testing.assert_allclose(estimate["state"][4:], TRUE, atol=4e-7)
 
 
 def test_a_resting_rotor_is_refused() -> None:
     with pytest.raises(ValueError, match="at rest"):
-        imbalance_history(begun(speed=0.0), samples=np.zeros((5, 4)), variance=VARIANCE)
+        imbalance_history(constants_of(speed=0.0), samples=np.zeros((5, 4)), variance=VARIANCE)
 
 
 def test_a_sample_that_is_not_a_number_is_passed_over() -> None:
-    estimate = begun()
-    predict(estimate[0], locked_masses(0.0j))
+    constants = constants_of()
+    estimate = begun(constants)
+    predict(constants, estimate, locked_masses(0.0j))
     before = estimate.copy()
-    assert correct(estimate[0], np.full(4, np.nan), VARIANCE) == 0.0
+    assert correct(constants, estimate, np.full(4, np.nan), VARIANCE) == 0.0
     np.testing.assert_array_equal(estimate["state"], before["state"])
     np.testing.assert_array_equal(estimate["covariance"], before["covariance"])
 
@@ -272,22 +341,23 @@ def test_a_sample_that_is_not_a_number_is_passed_over() -> None:
 def test_the_printed_observation_lets_the_imbalance_into_the_velocity() -> None:
     """Its last row is 0 0 0 1 1 1: the filter then blames the imbalance for what y' shows."""
     _, samples = record(steps=4000, seed=5, settings=QUIET)
-    right, printed = begun(), begun()
-    printed["observation"][0, 3, 4:] = 1.0
-    for estimate, good in ((right, True), (printed, False)):
-        estimates, _ = imbalance_history(estimate, samples=samples, variance=VARIANCE)
+    right, printed = constants_of(), constants_of()
+    printed.observation[0, 3, 4:] = 1.0
+    for constants, good in ((right, True), (printed, False)):
+        estimates, _ = imbalance_history(constants, samples=samples, variance=VARIANCE)
         error = np.hypot(*(estimates[-1, 4:] - TRUE)) / np.hypot(*TRUE)
         assert (error < 0.01) == good
 
 
 def test_the_printed_process_noise_is_no_covariance() -> None:
     """diag(O randn) with normal numbers is negative half of the time, and takes the covariance along."""
-    random, estimate, lowest = np.random.default_rng(0), begun(), 0.0
+    random, constants, lowest = np.random.default_rng(0), constants_of(), 0.0
+    estimate = begun(constants)
     for _ in range(200):
-        estimate["process"][0] = np.diag(1e-6 * random.standard_normal(6))
-        predict(estimate[0], locked_masses(0.0j))
-        correct(estimate[0], np.zeros(4), VARIANCE)
-        covariance = matrix(estimate, "covariance")
+        constants.process[0] = np.diag(1e-6 * random.standard_normal(6))
+        predict(constants, estimate, locked_masses(0.0j))
+        correct(constants, estimate, np.zeros(4), VARIANCE)
+        covariance = estimate["covariance"]
         lowest = min(lowest, float(np.min(np.linalg.eigvalsh(covariance))))
         if not np.all(np.isfinite(covariance)):
             break

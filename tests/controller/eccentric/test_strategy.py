@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from eccentric_runs import bundled, stage_names, stage_of
 
+from ringbalance.controller.eccentric_mass.imbalance_filter import PLATEAU_FRACTION
 from ringbalance.controller.eccentric_mass.memory import MEMORY, EccentricMeasurement
 from ringbalance.controller.eccentric_mass.outcome import EccentricOutcome
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
@@ -72,6 +74,23 @@ def test_a_seed_gives_the_same_bits(run: EccentricRun, scene: EccentricScene) ->
     np.testing.assert_array_equal(again.whirl, run.whirl)
     np.testing.assert_array_equal(again.voltage, run.voltage)
     assert not np.array_equal(simulate_eccentric(scene, seed=1).whirl, run.whirl)
+
+
+@pytest.mark.parametrize("factor", [0.97, 0.992, 1.008, 1.03])
+def test_a_speed_near_a_plateau_takes_its_matrices(scene: EccentricScene, factor: float) -> None:
+    """Within 1 % the estimate errs by d |d ln alpha/d ln W|, which is mended; beyond, none is made."""
+    speed, plant = scene.rotor.speed_profile[0].speed, PlantParameters.of(scene)
+    other = StrategySettings.of(at_constant_speed(scene, speed=factor * speed, time_limit=1.0))
+    settings = StrategySettings.of(scene)._replace(filter=other.filter)
+    run = simulate_eccentric(changed(scene, {"run.time_limit": 61.0}), settings=settings)
+    if abs(factor - 1) < PLATEAU_FRACTION:
+        assert run.outcome is EccentricOutcome.SETTLED
+        expected = abs(plant.influence(speed) / plant.influence(factor * speed) - 1)
+        true = plant.unbalance * cmath.exp(1j * plant.phase)
+        assert abs(run.imbalance - true) / plant.unbalance == pytest.approx(expected, rel=0.3)
+    else:
+        assert run.outcome is EccentricOutcome.SPEED_NOT_CONSTANT
+        assert "speed was not constant" in run.status
 
 
 def test_progress_is_reported(scene: EccentricScene) -> None:

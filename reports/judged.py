@@ -63,6 +63,7 @@ def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
         "capacity": [each.document() for each in tuning.capacity],
         **({"endurance": tuning.endurance.document()} if tuning.endurance else {}),
         **({"runout": runout} if runout else {}),
+        "standards": [each.document() for each in tuning.standards],
         **{name: document[name] for name in ("along", "ranking", "remedies")},
         "measures": [each.document() for each in measures],
     }

@@ -17,6 +17,7 @@ from ringbalance.controller.balancer import WATCH_TIME_S
 from ringbalance.controller.liquid_ring.drying import drying
 from ringbalance.controller.liquid_ring.loop_factor import vibration_left
 from ringbalance.controller.simulation import GasUse, Simulation
+from ringbalance.controller.standards import ConventionRow, grade_rows
 from ringbalance.physics import balancing
 from ringbalance.physics.evaporation import carried_off
 from ringbalance.reduced_model.gas_line import line_document, line_ends, line_text
@@ -317,7 +318,7 @@ def conventions(run: Simulation) -> tuple[Quantity, ...]:
     )
 
 
-def _convention_rows(run: Simulation) -> Iterator[tuple[str, str, float | None, str, str]]:
+def _convention_rows(run: Simulation) -> Iterator[ConventionRow]:
     """Key, name, value, unit and status of each quantity.
 
     Down to the lowest speeds the fullest chamber keeps its liquid with the gas off, by hydrostatics: to the
@@ -332,8 +333,30 @@ def _convention_rows(run: Simulation) -> Iterator[tuple[str, str, float | None, 
         permissible = permissible_unbalance(grade=grade, mass=rotor.mass, speed=rotor.speed)
         name = "permissible residual unbalance (ISO 21940-11)"
         yield "permissible_unbalance", name, permissible, "kg m", "ok"
-    ratio = balancing.unbalance_reduction_ratio(before=before, after=after) if before > 0 else None
-    yield "unbalance_reduction_ratio", "unbalance reduction ratio (ISO 21940-21)", ratio, "1", "ok"
+    yield from grade_rows(
+        mass=rotor.mass,
+        speed=rotor.speed,
+        residual=after / influence,
+        limit=run.limit / influence,
+        reached_by="at the end",
+    )
+    # The first correction ends when the next one begins: liquid flows until then.
+    starts = sorted({each.time for each in run.injections if each.moved})
+    ends = [float(np.interp(each, run.time, run.amplitude)) for each in (*starts, math.inf)[:2]]
+    for key, name, two in (
+        (
+            "unbalance_reduction_ratio",
+            "unbalance reduction ratio (ISO 21940-21), first correction",
+            ends,
+        ),
+        ("unbalance_reduction", "reduction of the unbalance over the whole run", [before, after]),
+    ):
+        ratio = (
+            balancing.unbalance_reduction_ratio(before=two[0], after=two[1])
+            if len(two) == 2 and two[0] > 0
+            else None
+        )
+        yield key, name, ratio, "1", "ok"
     vibration = vibration_left(scene, run.loop)
     left = None if vibration is None else vibration / influence
     name = "unbalance that noise leaves at most with this run's settings"

@@ -18,14 +18,35 @@ _ANGLES_RAD: Final[FloatArray] = np.concatenate(
     [np.geomspace(1e-5, 1e-2, 400), np.linspace(1e-2, math.pi - 1e-6, 1600)]
 )
 """Arguments of z on the unit circle."""
+_API_RPM_M: Final = 6350e-6
+"""4 oz in rpm/lb, which is 6350 g mm rpm/kg, in kg m rpm/kg."""
 
 
 def unbalance_reduction_ratio(*, before: float, after: float) -> float:
     """Unbalance reduction ratio of one correction, URR = 1 - U1/U0.
 
-    Source: ISO 21940-21:2012.
+    Source: ISO 21940-21:2012, not read; Hofmann's glossary of balancing: "ratio between the reduction of the
+    unbalance caused by a correction and the unbalance before that".
     """
     return 1.0 - after / before
+
+
+def balance_grade(*, unbalance: float, mass: float, speed: float) -> float:
+    """Balance quality grade of an unbalance of a whole rigid rotor, G = U W/M, m/s.
+
+    Source: ISO 21940-11:2016.
+    """
+    return unbalance * speed / mass
+
+
+def api_617_unbalance(*, mass: float, speed: float) -> float:
+    """Sum over both planes of the residual unbalance that API 617 allows, kg m: 6350 L/N g mm in each, L the
+    static load of its journal in kg and N the speed in rpm; both loads together are the rotor's mass.
+
+    Source: 4 L/N oz in with L in lb for each plane, as Energy-Tech quotes API 617, and Kane's dictionary
+        API 610; the standards were not read.
+    """
+    return _API_RPM_M * mass / (speed * 30.0 / math.pi)
 
 
 def rms_velocity(*, amplitude: float, speed: float) -> float:

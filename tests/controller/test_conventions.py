@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from paper_disc import CREST, VAPOUR, level, pressure
 
@@ -19,11 +21,44 @@ def test_unbalances_and_vibrations_follow_from_the_amplitudes(paper_scene: Scene
     run = simulate(paper_scene, paper_model(paper_scene))
     values = {each.key: each.value or 0.0 for each in conventions(run)}
     before, after = float(run.amplitude[0]), float(run.amplitude[-1])
-    assert values["unbalance_reduction_ratio"] == pytest.approx(1 - after / before)
+    assert values["unbalance_reduction"] == pytest.approx(1 - after / before)
     assert values["residual_unbalance"] * paper_scene.rotor.influence_coefficient == pytest.approx(after)
     # 10 um at 10 000 rpm.
     assert values["initial_velocity"] == pytest.approx(7.405e-3, rel=1e-3)
     assert values["gas_per_correction"] < run.gas.normal_volume
+
+
+def test_the_reduction_ratio_is_that_of_one_correction(paper_scene: Scene) -> None:
+    """Definition of ISO 21940-21: the first correction ends where the second begins."""
+    run = simulate(paper_scene, paper_model(paper_scene))
+    first, second = sorted({each.time for each in run.injections})[:2]
+    before, after = (float(run.amplitude[np.searchsorted(run.time, at)]) for at in (first, second))
+    values = {each.key: each.value for each in conventions(run)}
+    assert values["unbalance_reduction_ratio"] == pytest.approx(1 - after / before)
+    assert 0.1 < 1 - after / before < (values["unbalance_reduction"] or 0.0) - 0.1
+    nothing = {each.key: each.value for each in conventions(replace(run, injections=()))}
+    assert nothing["unbalance_reduction_ratio"] is None
+    assert nothing["unbalance_reduction"] == values["unbalance_reduction"]
+
+
+def test_grades_of_the_run_and_of_the_limit_are_apart(paper_scene: Scene) -> None:
+    """G = U W/M: 20 kg at 10 000 rpm; API 617 allows both planes G 0.665 together."""
+    assert not {"grade_reached", "api_617_unbalance"} & {
+        each.key for each in conventions(simulate(paper_scene, paper_model(paper_scene)))
+    }
+    scene = with_tables(paper_scene, rotor={"mass": 20.0})
+    run = simulate(scene, paper_model(scene))
+    rows = {each.key: each for each in conventions(run)}
+    speed, influence = scene.rotor.speed, scene.rotor.influence_coefficient
+    for key, amplitude in (("grade_reached", float(run.amplitude[-1])), ("grade_of_limit", run.limit)):
+        assert rows[key].value == pytest.approx(amplitude / influence * speed / 20.0)
+    assert rows["grade_reached"].value != rows["grade_of_limit"].value
+    allowed = rows["api_617_unbalance"]
+    assert (allowed.value or 0.0) * speed / 20.0 == pytest.approx(0.665e-3, rel=1e-3)
+    assert ": not exceeded at the end" in allowed.name
+    poor = replace(run, amplitude=np.full_like(run.amplitude, 1e-6))
+    (exceeded,) = (each for each in conventions(poor) if each.key == "api_617_unbalance")
+    assert ": exceeded at the end" in exceeded.name
 
 
 @pytest.mark.parametrize(("fill", "sure", "perhaps"), [(0.42, 7200, 5090), (0.436, 7470, 5280)])

@@ -16,6 +16,20 @@ def test_permissible_unbalance_is_the_standards_9549_g_m_over_n() -> None:
     assert permissible == pytest.approx(1e-6 * 9549 * 2.5 * 40.0 / rpm, rel=1e-4)
 
 
+def test_the_grade_of_a_permissible_unbalance_is_the_grade() -> None:
+    turning = {"mass": 40.0, "speed": 300.0}
+    permissible = permissible_unbalance(grade=2.5e-3, **turning)
+    assert balancing.balance_grade(unbalance=permissible, **turning) == pytest.approx(2.5e-3)
+
+
+def test_api_617_allows_four_ounce_inches_of_a_pound_and_a_turn_a_minute() -> None:
+    """Energy-Tech's example: 500 lb on each journal, 15 000 rpm, 0.13 oz in for each plane."""
+    ounce, inch = 28.349523125e-3, 25.4e-3
+    allowed = balancing.api_617_unbalance(mass=1000 * 16 * ounce, speed=15_000 * math.pi / 30)
+    assert allowed / 2 == pytest.approx(4 * 500 / 15_000 * ounce * inch, rel=1e-9)
+    assert allowed / 2 == pytest.approx(0.13 * ounce * inch, rel=0.03)
+
+
 def test_velocity_is_rms() -> None:
     assert balancing.rms_velocity(amplitude=1e-5, speed=100 * math.tau) == pytest.approx(4.443e-3, rel=1e-3)
 

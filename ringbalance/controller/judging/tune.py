@@ -21,9 +21,11 @@ from ringbalance.controller.judging.search import (
     searched,
 )
 from ringbalance.controller.judging.tuning import LONG_WATCH_TIME_S, Tuning
+from ringbalance.controller.rotor import CommonRotor
 from ringbalance.results.requirements import MET
 from ringbalance.results.rows import Finding
 from ringbalance.scene.draws import BLOCK
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import value_at, with_values_at
 
 _MAX_LONGER_DEVICES: Final = 4 * BLOCK
@@ -98,6 +100,7 @@ def tuned(
         along_name=axis_name,
         along_unit=axis.unit if axis else "1",
         information=balancer.information(with_values_at(balancer.scene, best.settings)),
+        rotor=_rotor(balancer),
         capacity=capacity,
         ranking=ranked(balancer, best),
         remedies=(
@@ -111,6 +114,14 @@ def tuned(
         open_choice=bool(balancer.choices()),
         endurance=endurance(balancer, best, report),
     )
+
+
+def _rotor(balancer: Balancer) -> CommonRotor | None:
+    """Rotor of a balancer; None: it stands still, or never vibrates steadily."""
+    try:
+        return balancer.rotor()
+    except SceneError:
+        return None
 
 
 def _worth_judging(winners: Sequence[Tried]) -> list[Settings]:

@@ -15,7 +15,8 @@ from ringbalance.controller.judging.judge import Judgement, plain_settings
 from ringbalance.controller.judging.ranking import Ranking
 from ringbalance.controller.judging.remedies import Remedied
 from ringbalance.controller.judging.search import ScanLevel
-from ringbalance.controller.rotor import assumed_rotor
+from ringbalance.controller.rotor import CommonRotor, assumed_rotor
+from ringbalance.controller.standards import grade_rows
 from ringbalance.controller.trials import Information
 from ringbalance.results.numbers import format_given, percent
 from ringbalance.results.requirements import MET, MISSED, OPEN
@@ -64,6 +65,8 @@ class Tuning(Result):
     """Path of the scan axis."""
     along_unit: str = "1"
     information: Information = field(default_factory=Information)
+    rotor: CommonRotor | None = None
+    """Rotor of the scene; None: it never vibrates steadily."""
     remedies: tuple[Remedied, ...] = ()
     """Judged changes of the scene, the best first; tried where the requirement is not met."""
     capacity: tuple[Finding, ...] = ()
@@ -232,6 +235,25 @@ class Tuning(Result):
                 status="ok" if times[part] is not None else "not_reached",
                 digits=3,
             )
+        yield from self.standards
+
+    @property
+    def standards(self) -> tuple[Quantity, ...]:
+        """Residual unbalance that the judged settings achieve, its grade, and what API 617 allows."""
+        rotor, judgement = self.rotor, self.judgement
+        if rotor is None or (amplitude := judgement.amplitude_reached) is None:
+            return ()
+        residual, limit = (each / abs(rotor.influence) for each in (amplitude, rotor.limit))
+        reached_by = f"by {percent(judgement.required_fraction)} of the devices"
+        name = f"minimum achievable residual unbalance (ISO 21940-21), with these settings, {reached_by}"
+        grades = grade_rows(
+            mass=rotor.mass, speed=rotor.speed, residual=residual, limit=limit, reached_by=reached_by
+        )
+        rows = [("minimum_achievable_unbalance", name, residual, "kg m", "ok"), *grades]
+        return tuple(
+            Quantity(key=key, name=name, value=value, unit=unit, origin="simulated", status=status, digits=3)
+            for key, name, value, unit, status in rows
+        )
 
     def _findings(self) -> Iterator[Finding]:
         """Sentences on the verdict, the settling times, the scene's own settings, causes and remedies."""

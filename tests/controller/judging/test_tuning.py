@@ -58,6 +58,23 @@ def test_the_papers_disc_works_at_a_lower_pressure(paper: Tuning) -> None:
     assert moments == sorted(moments, reverse=True)
 
 
+def test_the_smallest_residual_is_what_the_judged_devices_end_with(paper: Tuning) -> None:
+    """Neither a bound of the noise nor the limit, and graded where the rotor's mass is known."""
+    amplitudes = paper.judgement.outcomes.final_amplitude
+    assert paper.rotor is not None
+    (row,) = paper.standards
+    residual = row.value or 0.0
+    assert row.key == "minimum_achievable_unbalance"
+    within = np.mean(amplitudes <= residual * abs(paper.rotor.influence) * (1 + 1e-12))
+    assert paper.judgement.required_fraction <= within <= 1
+    assert residual * abs(paper.rotor.influence) < paper.rotor.limit
+    assert row.key in {each["key"] for each in paper.to_dict()["quantities"]}
+    heavy = replace(paper, rotor=replace(paper.rotor, mass=25.0))
+    grades = {each.key: each.value or 0.0 for each in heavy.standards}
+    assert grades["grade_reached"] == pytest.approx(residual * paper.rotor.speed / 25.0)
+    assert grades["grade_reached"] < grades["grade_of_limit"]
+
+
 def test_a_tuned_scene_is_a_scene(paper: Tuning) -> None:
     again = liquid_ring_scene(paper.recommended_scene)
     assert again.gas.pressure == paper.recommended.settings["gas.pressure"]

@@ -11,7 +11,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from ringbalance.scene.registry import register, register_function
+from ringbalance.scene.registry import register as register
+from ringbalance.scene.registry import register_function
 
 if TYPE_CHECKING:
     from ringbalance.calibration import calibrate as calibrate
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
     from ringbalance.scene import bundled_scene as bundled_scene
     from ringbalance.scene import load_scene as load_scene
     from ringbalance.scene.platform.progress_line import ProgressLine as ProgressLine
+    from ringbalance.scene.registry import register as register
     from ringbalance.search import find_design as find_design
     from ringbalance.showing import panel as panel
     from ringbalance.studies import extremes as extremes
@@ -135,6 +137,7 @@ _NAMES = {
         "Regime",
     ),
     "scene.platform.progress_line": ("ProgressLine",),
+    "scene.registry": ("register",),
     "scene": (
         "Scene",
         "SceneError",

@@ -61,7 +61,7 @@ def law_for(scene: AnyScene, law: str) -> str | None:
     """
     if law == _CALIBRATED:
         return None
-    if "flow_law" in registered("balancer", scene.balancer).options:
+    if "flow_law" in getattr(registered("balancer", scene.balancer), "options", ()):
         return law
     problem = f"the balancer of {scene.source} has no flow law"
     raise SceneError.of_option(

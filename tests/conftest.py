@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import os
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, cast
 
+import ball_balancer
 import pytest
 from hypothesis import settings
 
 import ringbalance
+from ringbalance.scene import registry
 
 if TYPE_CHECKING:
     from ringbalance.scene.models import Scene
@@ -57,6 +60,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def paper_scene() -> Scene:
     """The liquid-ring paper's disc, as bundled."""
     return cast("Scene", ringbalance.load_scene(ringbalance.bundled_scene("liquid_ring_paper")))
+
+
+@pytest.fixture(scope="module")
+def ball_registered() -> Iterator[None]:
+    """The balancer of docs/examples, known while the tests of one module run."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry, "_PATHS", dict(registry._PATHS))
+        ball_balancer.register()
+        yield
 
 
 @pytest.fixture(scope="session")

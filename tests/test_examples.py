@@ -14,6 +14,7 @@ import doc_tables
 import pytest
 
 import ringbalance as rb
+from ringbalance.scene import registry
 
 LONG: Final = {"Comparison", "Design", "Extremes", "Tuning", "extremes", "find_design", "write_report"}
 """Whose examples take long, or run what the example of the function that makes them runs."""
@@ -36,6 +37,7 @@ def examples(name: str) -> list[doctest.DocTest]:
 def test_an_example_gives_what_it_shows(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.setattr(registry, "_PATHS", dict(registry._PATHS))
     (test,) = examples(name)
     assert any(f"rb.{name}" in each.source for each in test.examples) or name in {
         "Calibration",

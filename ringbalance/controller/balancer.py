@@ -18,15 +18,14 @@ import numpy as np
 
 from ringbalance.controller.rotor import CommonRotor, Rotors
 from ringbalance.controller.trials import MEASURE_INPUT, DrawnInput, Information, Trials
-from ringbalance.reduced_model.law.flow_law import CALIBRATED, UNCHECKED
+from ringbalance.reduced_model.law.flow_law import UNCHECKED
 from ringbalance.results.requirements import AT_LEAST, AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.faults import SceneError
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.registry import registered
+from ringbalance.scene.registry import registered, unusable
 from ringbalance.scene.units import DIMENSIONS
 
 WATCH_TIME_S: Final = 60.0
@@ -409,13 +408,23 @@ class Balancer(ABC):
         """Histories of a traced run by the name of their column, with the unit in the name."""
 
 
+def balancer_class_of(name: str) -> Any:
+    """Class of a registered balancer. Raises: SceneError: none, or one that lacks methods."""
+    kind = registered("balancer", name)
+    if not (isinstance(kind, type) and issubclass(kind, Balancer)):
+        raise unusable(name, f"{kind!r} is no subclass of ringbalance.controller.balancer.Balancer")
+    if missing := sorted(getattr(kind, "__abstractmethods__", ())):
+        raise unusable(name, f"{kind.__name__} has no {', '.join(missing)}")
+    return kind
+
+
 def balancer_of(scene: SceneFile, **options: Any) -> Balancer:
     """The balancer of a scene.
 
     Args: `options`: of its class, such as `flow_law` of a liquid ring; None counts as not given.
     Raises: ValueError: an option that this balancer does not have.
     """
-    balancer_class = registered("balancer", scene.balancer)
+    balancer_class = balancer_class_of(scene.balancer)
     stated = {name: value for name, value in options.items() if value is not None}
     if foreign := sorted(set(stated) - balancer_class.options):
         raise ValueError(f"the balancer {scene.balancer} has no {', '.join(foreign)}: leave that out")
@@ -425,27 +434,12 @@ def balancer_of(scene: SceneFile, **options: Any) -> Balancer:
 
 def takes(scene: SceneFile, option: str) -> bool:
     """True if the balancer of a scene has an option, such as "flow_law"."""
-    return option in registered("balancer", scene.balancer).options
+    return option in balancer_class_of(scene.balancer).options
 
 
 def quick_balancer(scene: SceneFile) -> Balancer:
     """Balancer for runs of many designs; under the unchecked flow law if it has a flow law."""
     return balancer_of(scene, flow_law=UNCHECKED) if takes(scene, "flow_law") else balancer_of(scene)
-
-
-def balancer_under(law: str, scene: SceneFile) -> Balancer:
-    """The balancer of a scene under the law of the option `--law`.
-
-    Raises: SceneError: a law for a balancer that has none.
-    """
-    if law == CALIBRATED:
-        return balancer_of(scene)
-    if not takes(scene, "flow_law"):
-        problem = f"the balancer of {scene.source} has no flow law"
-        raise SceneError.of_option(
-            option="--law", value=law, problem=problem, allowed="this option with a liquid ring alone"
-        )
-    return balancer_of(scene, flow_law=law)
 
 
 def inputs_of(scene: SceneFile, width: Callable[[str, float], float] | None = None) -> tuple[Input, ...]:

@@ -13,7 +13,7 @@ from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.models import Bend, Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.registry import balancers
+from ringbalance.scene.registry import known_balancers
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 from ringbalance.scene.units import DIMENSIONS, format_quantity, shortest_quantity
@@ -122,7 +122,7 @@ def _line_at(path: str) -> _SceneLine:
     if path in _LINES:
         return _LINES[path]
     table, _, key = path.split("[")[0].partition(".")
-    for kind in map(scene_kind, balancers()):
+    for kind in map(scene_kind, known_balancers()):
         keys = kind.schema.tables[table].keys if table in kind.schema.tables else {}
         takes = keys[key].takes if key in keys else None
         if takes is not None and takes.dimension:

@@ -9,7 +9,7 @@ from typing import Any
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.reading import SceneInput, SceneReading
 from ringbalance.scene.keys.schema import Schema
-from ringbalance.scene.registry import registered
+from ringbalance.scene.registry import registered, unusable
 from ringbalance.scene.units import format_quantity
 
 Read = Callable[[SceneInput], tuple[SceneReading, tuple[Fault, ...]]]
@@ -32,8 +32,13 @@ class SceneKind:
 
 
 def scene_kind(name: str) -> SceneKind:
-    """The kind of scene of a registered balancer. Raises: KeyError: none of that name is registered."""
-    kind: SceneKind = registered("scene", name)
+    """The kind of scene of a registered balancer.
+
+    Raises: KeyError: none of that name is registered. SceneError: its package cannot be used.
+    """
+    kind = registered("scene", name)
+    if not isinstance(kind, SceneKind):
+        raise unusable(name, "its scene is no ringbalance.scene.kinds.SceneKind")
     return kind
 
 

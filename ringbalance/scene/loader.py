@@ -11,7 +11,7 @@ from os import PathLike
 from pathlib import Path, PurePath
 from typing import Any, Final
 
-from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean
+from ringbalance.scene.faults import Fault, SceneError, did_you_mean
 from ringbalance.scene.keys.reading import SceneInput, SceneReading
 from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.kinds import scene_kind
@@ -19,7 +19,7 @@ from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import VECTOR_KEYS, CheckedValues, InputUncertainty, ShownOrigin
 from ringbalance.scene.platform.display import LOG
 from ringbalance.scene.platform.files import read_bounded
-from ringbalance.scene.registry import balancers
+from ringbalance.scene.registry import has_balancer, installed_balancers, known_balancers
 from ringbalance.scene.rules.fitted import fitted_faults
 from ringbalance.scene.toml import read_toml, toml_text
 
@@ -151,8 +151,8 @@ def _checked_reading(content: SceneInput, before: CheckedValues | None) -> Scene
 
     Raises: SceneError: errors in the order of the reference of the scene file, unknown keys last.
     """
-    kind, file = _kind(content.document), content.file
-    if before and _kind(before.document) == kind:
+    kind, file = _kind(content), content.file
+    if before and before.document.get("balancer") == content.document.get("balancer"):
         content = replace(content, before=before.tables)
     reading, read_faults = scene_kind(kind).read(content)
     schema, faults = reading.schema, list(read_faults)
@@ -233,12 +233,29 @@ def _fields(kind: type, table: str) -> tuple[tuple[str, str, Any], ...]:
     )
 
 
-def _kind(document: Mapping[str, Any]) -> str:
-    """Kind of balancer: the file's word, else the closest known one, else the default."""
-    word = document.get("balancer")
-    if word in balancers():
-        return str(word)
-    return (closest(word, balancers()) if isinstance(word, str) else "") or balancers()[0]
+def _kind(content: SceneInput) -> str:
+    """Kind of balancer: the file's word, or the default.
+
+    Raises: SceneError: no balancer of that name is installed; what else the file holds cannot be judged.
+    """
+    if "balancer" not in content.document:
+        return known_balancers()[0]
+    word = content.document["balancer"]
+    if isinstance(word, str) and has_balancer(word):
+        return word
+    packages = installed_balancers()
+    names = dict.fromkeys([*known_balancers(), *packages])
+    fault = Fault(
+        file=content.file,
+        key="balancer",
+        value=toml_text(word),
+        problem="no balancer of this name is installed"
+        + (did_you_mean(word, names) if isinstance(word, str) else ""),
+        allowed=", ".join(
+            f'"{name}"' + (f" (of {packages[name]})" if name in packages else "") for name in names
+        ),
+    )
+    raise SceneError([fault])
 
 
 def bundled_scene(name: str) -> Path:

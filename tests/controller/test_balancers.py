@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from balancer_checks import CHECKS, Check, short
-from ball_balancer.scene_keys import EXAMPLE, BallScene
+from ball_balancer.scene_keys import BallScene
+from own_balancers import EXAMPLE
 
 import ringbalance as rb
 from ringbalance.cli import main
@@ -18,9 +19,9 @@ from ringbalance.controller.compare import compare
 from ringbalance.identification.reading import template
 from ringbalance.scene.loader import bundled_scene, load_scene, scene_from
 from ringbalance.scene.narrowing import scene_as
-from ringbalance.scene.registry import balancers, register
+from ringbalance.scene.registry import known_balancers
 
-register("ball", scene="ball_balancer.scene_keys:KIND", balancer="ball_balancer.balancer:BallBalancer")
+pytestmark = pytest.mark.usefixtures("ball_registered")
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +42,7 @@ def balancer(request: pytest.FixtureRequest, balls: BallScene) -> Balancer:
 
 
 def test_every_balancer_is_checked() -> None:
-    assert balancers() == ("liquid_ring", "eccentric_mass", "ball")
+    assert known_balancers() == ("liquid_ring", "eccentric_mass", "ball")
 
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)

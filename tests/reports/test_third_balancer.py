@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ball_balancer.scene_keys import EXAMPLE
 from check_traces import traces, untrue
+from own_balancers import EXAMPLE
 from report_texts import page_text
 
 from ringbalance.running import run_command
-from ringbalance.scene.registry import register
 
 Record = dict[str, Any]
-register("ball", scene="ball_balancer.scene_keys:KIND", balancer="ball_balancer.balancer:BallBalancer")
+pytestmark = pytest.mark.usefixtures("ball_registered")
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from ringbalance.scene import SceneError, registry
+from ringbalance.scene import SceneError
 
 REFUSED = tomllib.loads((Path(__file__).parent / "data" / "refused.toml").read_text(encoding="utf-8"))
 CASES = [(kind, name) for kind, cases in REFUSED.items() for name in cases]
@@ -22,9 +22,7 @@ def test_every_fault_is_named(
     paper_document: dict[str, Any],
     driven_document: dict[str, Any],
     load: Callable[[Mapping[str, Any]], Any],
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.delitem(registry._PATHS, ("scene", "ball"), raising=False)  # of another test
     case, document = REFUSED[kind][name], paper_document if kind == "liquid_ring" else driven_document
     for path in case.get("remove", ()):
         table, _, key = path.rpartition(".")

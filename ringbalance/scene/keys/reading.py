@@ -13,7 +13,7 @@ from typing import Any, Literal
 from ringbalance.scene.faults import MISSING, Fault, closest, meant_text
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.schema import KeyPath, Schema
-from ringbalance.scene.registry import balancers, registered
+from ringbalance.scene.registry import known_balancers, registered
 from ringbalance.scene.toml import toml_key, toml_text
 from ringbalance.scene.units import FieldError, format_quantity
 
@@ -328,7 +328,7 @@ def _fault(rejected: _Rejected, file: str, schema: Schema, *, meant: str | None)
 
 def _other_balancer(steps: KeyPath) -> str:
     """Name of a balancer whose scenes have a key of a table; empty for none."""
-    for name in balancers() if len(steps) == 2 else ():
+    for name in known_balancers() if len(steps) == 2 else ():
         schema: Schema = registered("scene", name).schema
         if steps[1] in schema.keys_in([str(steps[0])]):
             return name

@@ -15,7 +15,7 @@ from ringbalance.scene.fitted import Fitted
 from ringbalance.scene.keys.declaration import Entries, Key, Presence, derived, keys_of, standard, unused
 from ringbalance.scene.keys.fields import Bounds, choice, half_width, one_of, share, text
 from ringbalance.scene.origins import Measured, Origin
-from ringbalance.scene.registry import balancers
+from ringbalance.scene.registry import known_balancers
 
 KeyPath = tuple[int | str, ...]
 ORIGIN = "origin"
@@ -122,7 +122,7 @@ class Schema:
             with_origins[name] = replace(table, keys={**table.keys, ORIGIN: origins})
         top = {
             "name": Key(takes=text(), presence=derived("the file's name", "title of the scene")),
-            "balancer": Key(takes=one_of(balancers), presence=balancer),
+            "balancer": Key(takes=one_of(known_balancers), presence=balancer),
         }
         return cls(top=MappingProxyType(top), tables=MappingProxyType(with_origins), scene=scene)
 

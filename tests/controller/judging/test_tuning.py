@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 from ball_balancer.balancer import BallBalancer
-from ball_balancer.scene_keys import EXAMPLE, BallScene
+from ball_balancer.scene_keys import BallScene
+from own_balancers import EXAMPLE
 
 import ringbalance as rb
 from ringbalance.cli import main
@@ -25,9 +26,8 @@ from ringbalance.results.requirements import MET, MISSED
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene, scene_as
-from ringbalance.scene.registry import register
 
-register("ball", scene="ball_balancer.scene_keys:KIND", balancer="ball_balancer.balancer:BallBalancer")
+pytestmark = pytest.mark.usefixtures("ball_registered")
 
 
 def bundled(name: str, **values: object) -> Scene:

@@ -70,30 +70,3 @@ _SCHEMA = Schema.of(
     scene=BallScene,
 )
 KIND = SceneKind(schema=_SCHEMA, read=reader_of(_SCHEMA, ()), main=(("balls.mass", "balls.race_radius"),))
-EXAMPLE = b"""
-name = "Two balls in oil"
-balancer = "ball"
-
-[rotor]
-speed = "3000 rpm"
-influence_coefficient = "0.5 um/(g*mm)"
-lag_angle = "175 deg"
-unbalance = "80 g*mm"
-
-[balls]
-mass = "1 g"
-race_radius = "50 mm"
-drag = "0.05 N*s/m"
-
-[vibration]
-limit = "2 um"
-
-[run]
-time_limit = "20 s"
-
-[uncertainty.balls]
-mass = "1 %"
-drag = "20 %"
-[uncertainty.rotor]
-influence_coefficient = "10 %"
-"""

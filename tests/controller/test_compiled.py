@@ -45,7 +45,7 @@ def test_division_by_zero_is_infinite_as_in_numpy() -> None:
 
 def test_without_compilation_functions_stay_plain() -> None:
     text = (
-        "from ringbalance.controller.eccentric_mass.integration import plant_step\n"
+        "from ringbalance.controller.eccentric_mass.plant import plant_step\n"
         "assert type(plant_step).__name__ == 'function'\n"
     )
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}

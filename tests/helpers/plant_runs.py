@@ -4,16 +4,53 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.integration import plant_step
+from ringbalance.controller.eccentric_mass import plant as machine
 from ringbalance.controller.eccentric_mass.plant import (
+    FLAG,
+    SIZE,
     STUCK,
+    VOLTAGE,
     PlantParameters,
-    rest_state,
+    plant_row,
     speed_at,
-    stuck_flags,
 )
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.arrays import FloatArray
+
+
+def rest_state(angles: tuple[float, float]) -> FloatArray:
+    """State of a rotor at its centre with masses at rest on the track, shape (8,)."""
+    return plant_row(angles)[:SIZE]
+
+
+def stuck_flags(flag: float) -> FloatArray:
+    """One flag for both masses, shape (2,)."""
+    return np.full(2, flag)
+
+
+def row_of(
+    plant: PlantParameters, state: FloatArray, stuck: FloatArray, command: FloatArray, rate: float = 0.0
+) -> FloatArray:
+    """Row of the plant before a step with these voltages and this speed rate."""
+    row = plant_row((0.0, 0.0))
+    row[:SIZE], row[FLAG : FLAG + 2], row[VOLTAGE : VOLTAGE + 2] = state, stuck, command
+    machine._set_inputs(plant, row, rate)
+    return row
+
+
+def plant_step(
+    plant: PlantParameters,
+    state: FloatArray,
+    stuck: FloatArray,
+    command: FloatArray,
+    speed: float,
+    rate: float,
+    step: float,
+) -> tuple[FloatArray, FloatArray]:
+    """State and flags after one step."""
+    row = row_of(plant, state, stuck, command)
+    machine.plant_step(plant, row, speed, rate, step)
+    return row[:SIZE].copy(), row[FLAG : FLAG + 2].copy()
 
 
 def run_steps(
@@ -21,10 +58,10 @@ def run_steps(
     times: FloatArray,
     speeds: FloatArray,
     state: FloatArray,
-    stuck: IntArray,
+    stuck: FloatArray,
     commands: FloatArray,
     step: float,
-) -> tuple[FloatArray, IntArray]:
+) -> tuple[FloatArray, FloatArray]:
     """States, shape (steps + 1, 8), and flags, shape (steps + 1, 2), over steps of equal length."""
     states, flags = [state], [stuck]
     for place, command in enumerate(commands):

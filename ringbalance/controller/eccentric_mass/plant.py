@@ -20,12 +20,18 @@ and the back-emf both oppose the motion.
 
 The imbalance mass is a part of m_r.  The state is [x, y, x', y', phi_1, phi_2, phi_1', phi_2'], angles not
 wrapped; in addition each mass has a flag: SLIDING, STUCK or LOCKED.  A locked mass is clamped to its track
-by a brake that no torque overcomes.
+by a brake that no torque overcomes.  A step is plain loops on the real numbers of one row, state first.
 
 Dry friction is a set-valued law.  A sliding mass is braked by mu_f b (W + phi')^2.  A mass at rest on its
 track is held by any torque up to mu_f b W^2; under a larger load it breaks away in the direction of the load.
 Since phi'' enters both masses' equations, two masses at rest are treated together: the mass matrix is
 positive definite, so exactly one of the nine combinations of held, forwards and backwards is consistent.
+
+Between events, where a mass stops, sticks or breaks away, the motion is smooth and integrated by the
+fifth-order Runge-Kutta formula of Dormand and Prince, in substeps that are short compared with the time
+constants of the plant.  An event is located by bisection to machine precision; the mass is set to rest there,
+and the friction law decides its further motion.  While friction holds both masses at constant speed the step
+has a closed form.
 
 Source: Eqs. (1) to (11) of the paper on eccentric masses, rederived; docs/eccentric-masses.md has the
 differences.
@@ -42,12 +48,11 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.physics.balancing import amplification_factor, critical_speed
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.compiled import in_place
 
 Pair = tuple[float, float]
 """Values of first and second mass."""
-Motions = tuple[int, int]
 
 
 class PlantParameters(NamedTuple):
@@ -178,217 +183,321 @@ def turned(times: FloatArray, speeds: FloatArray, time: float) -> float:
     return angle
 
 
-SLIDING: Final = 0
-STUCK: Final = 1
-LOCKED: Final = 2
+SLIDING, STUCK, LOCKED = 0.0, 1.0, 2.0
+"""Flags of a mass."""
+X, Y, X_RATE, Y_RATE, ANGLE, TURN = 0, 1, 2, 3, 4, 6
+"""Indices of the state in a row: displacement, m, velocity, m/s, angles, rad, and rates, rad/s."""
+SIZE: Final = 8
+FLAG, VOLTAGE = 8, 10
+_SPEED_RATE, _UNBALANCE, _TORQUE, _MOTION, _ACCELERATION, _BEFORE = 12, 13, 15, 17, 19, 21
+_FORCE, _DRIVING, _FRICTION, _COSINE, _SINE, _CROSS = 23, 25, 27, 29, 31, 33
+_TRIAL, _SLOPES, ROW_SIZE = 34, 42, 90
+"""Indices behind the state: flags and voltages, V, of both masses, then what a step works with."""
 
-HELD: Final = 0
-FORWARDS: Final = 1
-BACKWARDS: Final = -1
+MAX_RATE_PRODUCT: Final = 0.1
+"""Largest product of a substep and the plant's fastest rate."""
+_BISECTIONS, _MAX_EVENTS = 40, 64
+_ROUNDING, _LEAST_ROOT = 1e-12, 1e-6
+_COUPLING: Final = np.array(
+    [
+        [0, 0, 0, 0, 0, 0],
+        [1 / 5, 0, 0, 0, 0, 0],
+        [3 / 40, 9 / 40, 0, 0, 0, 0],
+        [44 / 45, -56 / 15, 32 / 9, 0, 0, 0],
+        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0, 0],
+        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0],
+        [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+    ]
+)
+"""Weights of the earlier stages in each of the six stages, and in the result of order 5.
 
-_ROUNDING: Final = 1e-12
+Source: Dormand and Prince, "A family of embedded Runge-Kutta formulae", J. Comp. Appl. Math. 6 (1980).
+"""
+_TIMES: Final = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0])
+"""Times of the stages, as fractions of the step."""
 
 
-class _Torques(NamedTuple):
-    """Equations of both masses once the rotor's accelerations are eliminated.
+def plant_row(angles: Pair, flag: float = STUCK) -> FloatArray:
+    """Row of a rotor at its centre, in its own frame, with masses at rest on the track and motors off."""
+    row = np.zeros(ROW_SIZE)
+    row[ANGLE:TURN], row[FLAG:VOLTAGE] = angles, flag
+    return row
 
-    A phi'' = g - friction, with A = [[inertia, cross], [cross, inertia]].
+
+@in_place
+def _set_loads(plant: PlantParameters, row: FloatArray, at: int, speed: float) -> None:
+    """Write the forces on rotor and masses in the state at an index of the row.
+
+    Without the rotor's accelerations A phi'' = g - friction, with A_ij = (J + J_add) delta_ij
+    - b^2 / M cos(phi_i - phi_j) and g_i = u_i - J W' - b / M (-F_x sin phi_i + F_y cos phi_i), where F is all
+    in the rotor's equations but M a and b phi''.
     """
-
-    inertia: float
-    """J + J_add - b^2 / M, kg m^2."""
-    cross: float
-    """-b^2 / M cos(phi_1 - phi_2), kg m^2."""
-    driving: Pair
-    """g of each mass, all torques but friction, N m."""
-    friction: Pair
-    """mu_f b (W + phi')^2 of each mass, N m."""
-
-
-@in_place
-def angular_accelerations(torques: _Torques, motion: Motions) -> Pair:
-    """phi'' of both masses in given motions, rad/s^2."""
-    inertia, cross = torques.inertia, torques.cross
-    net_1 = torques.driving[0] - motion[0] * torques.friction[0]
-    net_2 = torques.driving[1] - motion[1] * torques.friction[1]
-    if motion[0] == HELD:
-        return 0.0, 0.0 if motion[1] == HELD else net_2 / inertia
-    if motion[1] == HELD:
-        return net_1 / inertia, 0.0
-    determinant = inertia * inertia - cross * cross
-    first = (inertia * net_1 - cross * net_2) / determinant
-    second = (inertia * net_2 - cross * net_1) / determinant
-    return first, second
-
-
-@in_place
-def slips(torques: _Torques, mass: int, other_acceleration: float) -> bool:
-    """Return True if a held mass breaks loose: |g - cross phi''_other| > mu_f b W^2."""
-    load = abs(torques.driving[mass] - torques.cross * other_acceleration)
-    return load > torques.friction[mass] * (1.0 + _ROUNDING)
-
-
-@in_place
-def _consistent(torques: _Torques, motion: Motions, loose: tuple[bool, bool]) -> bool:
-    """Return True if motions of masses at rest are consistent; a mass that already moves is skipped."""
-    acceleration = angular_accelerations(torques, motion)
+    b, rate = plant.moment, row[_SPEED_RATE]
+    x, y = row[at + X], row[at + Y]
+    force_x = speed * speed * row[_UNBALANCE] + rate * row[_UNBALANCE + 1]
+    force_y = speed * speed * row[_UNBALANCE + 1] - rate * row[_UNBALANCE]
+    force_x -= plant.damping * (row[at + X_RATE] - speed * y) + plant.stiffness * x
+    force_y -= plant.damping * (row[at + Y_RATE] + speed * x) + plant.stiffness * y
     for i in range(2):
-        if loose[i]:
-            slipping = motion[i] == HELD and slips(torques, i, acceleration[1 - i])
-            if slipping or motion[i] * acceleration[i] < 0.0:
-                return False
+        cosine, sine = math.cos(row[at + ANGLE + i]), math.sin(row[at + ANGLE + i])
+        square = (speed + row[at + TURN + i]) * (speed + row[at + TURN + i])
+        force_x += b * (square * cosine + rate * sine)
+        force_y += b * (square * sine - rate * cosine)
+        row[_COSINE + i], row[_SINE + i] = cosine, sine
+        row[_FRICTION + i] = plant.friction_arm[i] * b * square
+    for i in range(2):
+        motor = row[_TORQUE + i] - plant.drive_damping * row[at + TURN + i]
+        load = b / plant.mass * (force_y * row[_COSINE + i] - force_x * row[_SINE + i])
+        row[_DRIVING + i] = motor - plant.inertia * rate - load
+    row[_FORCE], row[_FORCE + 1] = force_x, force_y
+    cosine = row[_COSINE] * row[_COSINE + 1] + row[_SINE] * row[_SINE + 1]
+    row[_CROSS] = -b * b / plant.mass * cosine
+
+
+@in_place
+def _set_accelerations(plant: PlantParameters, row: FloatArray) -> None:
+    """Write phi'' of both masses in their motions, rad/s^2, from the forces in the row."""
+    inertia = plant.inertia + plant.drive_inertia - plant.moment * plant.moment / plant.mass
+    first, second, cross = 0.0, 0.0, 0.0
+    if row[_MOTION] != 0.0:
+        first = row[_DRIVING] - row[_MOTION] * row[_FRICTION]
+    if row[_MOTION + 1] != 0.0:
+        second = row[_DRIVING + 1] - row[_MOTION + 1] * row[_FRICTION + 1]
+    if row[_MOTION] * row[_MOTION + 1] != 0.0:
+        cross = row[_CROSS]
+    determinant = inertia * inertia - cross * cross
+    row[_ACCELERATION] = (inertia * first - cross * second) / determinant
+    row[_ACCELERATION + 1] = (inertia * second - cross * first) / determinant
+
+
+@in_place
+def _slips(row: FloatArray, mass: int) -> bool:
+    """Return True if a held mass breaks loose: |g - A_12 phi''_other| > mu_f b W^2."""
+    load = abs(row[_DRIVING + mass] - row[_CROSS] * row[_ACCELERATION + 1 - mass])
+    return bool(load > row[_FRICTION + mass] * (1.0 + _ROUNDING))
+
+
+@in_place
+def _set_motion(plant: PlantParameters, row: FloatArray) -> None:
+    """Write flags and motions, 0 for held or the sign of the rate; one of nine combinations is consistent."""
+    # The tenth trial, held again, is reached by round-off only: the torques are at their bounds.
+    for trial in range(10):
+        consistent = True
+        for i in range(2):
+            way = (trial // 3) % 3 if i == 0 else trial % 3
+            row[_MOTION + i] = 1.0 if way == 1 else -0.5 * way
+            if row[FLAG + i] == LOCKED:
+                row[_MOTION + i] = 0.0
+            elif row[TURN + i] != 0.0:
+                row[_MOTION + i] = 1.0 if row[TURN + i] > 0.0 else -1.0
+        _set_accelerations(plant, row)
+        for i in range(2):
+            if row[FLAG + i] != LOCKED and row[TURN + i] == 0.0:
+                slipping = row[_MOTION + i] == 0.0 and _slips(row, i)
+                if slipping or row[_MOTION + i] * row[_ACCELERATION + i] < 0.0:
+                    consistent = False
+        if consistent:
+            break
+    for i in range(2):
+        if row[FLAG + i] != LOCKED:
+            row[FLAG + i] = STUCK if row[_MOTION + i] == 0.0 else SLIDING
+
+
+@in_place
+def _set_slope(plant: PlantParameters, row: FloatArray, at: int, speed: float, out: int) -> None:
+    """Write the time derivative of the state at one index to another, for the motions in the row."""
+    _set_loads(plant, row, at, speed)
+    _set_accelerations(plant, row)
+    first, second = row[_ACCELERATION], row[_ACCELERATION + 1]
+    pull_x = plant.moment * (row[_SINE] * first + row[_SINE + 1] * second)
+    pull_y = plant.moment * (row[_COSINE] * first + row[_COSINE + 1] * second)
+    x, y, rate = row[at + X], row[at + Y], row[_SPEED_RATE]
+    turning_x = 2 * speed * row[at + Y_RATE] + rate * y + speed * speed * x
+    turning_y = 2 * speed * row[at + X_RATE] + rate * x - speed * speed * y
+    row[out + X], row[out + Y] = row[at + X_RATE], row[at + Y_RATE]
+    row[out + X_RATE] = (row[_FORCE] + pull_x) / plant.mass + turning_x
+    row[out + Y_RATE] = (row[_FORCE + 1] - pull_y) / plant.mass - turning_y
+    for i in range(2):
+        row[out + ANGLE + i], row[out + TURN + i] = row[at + TURN + i], row[_ACCELERATION + i]
+
+
+@in_place
+def _smooth(plant: PlantParameters, row: FloatArray, speed: float, step: float) -> None:
+    """Write the state one step later as trial, for unchanged motions of the masses."""
+    for stage in range(7):
+        for i in range(SIZE):
+            total = 0.0
+            for earlier in range(stage):
+                total += _COUPLING[stage, earlier] * row[_SLOPES + SIZE * earlier + i]
+            row[_TRIAL + i] = row[i] + step * total
+        if stage < 6:
+            now = speed + row[_SPEED_RATE] * step * _TIMES[stage]
+            _set_slope(plant, row, _TRIAL, now, _SLOPES + SIZE * stage)
+
+
+@in_place
+def _has_event(plant: PlantParameters, row: FloatArray, speed: float) -> bool:
+    """Return True if a mass has stopped or broken away in the trial."""
+    holds = False
+    for i in range(2):
+        if row[_MOTION + i] * row[_TRIAL + TURN + i] < 0.0:
+            return True
+        holds = holds or (row[_MOTION + i] == 0.0 and row[FLAG + i] != LOCKED)
+    if not holds:
+        return False
+    _set_loads(plant, row, _TRIAL, speed)
+    _set_accelerations(plant, row)
+    loose = False
+    for i in range(2):
+        loose = loose or (row[_MOTION + i] == 0.0 and row[FLAG + i] != LOCKED and _slips(row, i))
+    return loose
+
+
+@in_place
+def _advance(plant: PlantParameters, row: FloatArray, speed: float, step: float) -> None:
+    """Integrate state and flags over one substep; each event ends a part of it, at the time just after."""
+    done, rate = 0.0, row[_SPEED_RATE]
+    for event in range(_MAX_EVENTS):
+        now, left = speed + rate * done, step - done
+        _set_loads(plant, row, 0, now)
+        _set_motion(plant, row)
+        _smooth(plant, row, now, left)
+        cut = event < _MAX_EVENTS - 1 and _has_event(plant, row, now + rate * left)
+        if cut:
+            before, after = 0.0, left
+            for _ in range(_BISECTIONS):
+                middle = 0.5 * (before + after)
+                if not before < middle < after:
+                    break
+                _smooth(plant, row, now, middle)
+                if _has_event(plant, row, now + rate * middle):
+                    after = middle
+                else:
+                    before = middle
+            _smooth(plant, row, now, after)
+            done += after
+        for i in range(SIZE):
+            row[i] = row[_TRIAL + i]
+        for i in range(2):
+            if cut and row[_MOTION + i] * row[TURN + i] < 0.0:
+                row[TURN + i] = 0.0
+        if not cut or done >= step:
+            return
+
+
+@in_place
+def fastest_rate(plant: PlantParameters, speed: float) -> float:
+    """Bound on any rate, rad/s: |W| + sqrt(K_B/M) + C_B/M + C_add/(J + J_add - 2 b^2/M)."""
+    least = plant.inertia + plant.drive_inertia - 2 * plant.moment * plant.moment / plant.mass
+    rotor = math.sqrt(plant.stiffness / plant.mass) + plant.damping / plant.mass
+    return abs(speed) + rotor + plant.drive_damping / least
+
+
+@in_place
+def substeps(plant: PlantParameters, speed: float, rate: float, step: float) -> int:
+    """Number of substeps, at least 1, that keeps rate times substep within `MAX_RATE_PRODUCT`."""
+    fastest = fastest_rate(plant, max(abs(speed), abs(speed + rate * step)))
+    return max(1, math.ceil(fastest * step / MAX_RATE_PRODUCT))
+
+
+@in_place
+def _length(x: float, y: float) -> float:
+    return math.sqrt(x * x + y * y)
+
+
+@in_place
+def _held_step(plant: PlantParameters, row: FloatArray, speed: float, step: float) -> bool:
+    """Integrate the rotor over one step if both masses are certainly held; return True if so.
+
+    The deviation from the steady whirl, seen in the fixed frame, obeys D'' + 2 h D' + k D = 0: with
+    A = D' + h D and w^2 = k - h^2, D(t) = exp(-h t) (D cos w t + A / w sin w t), and cosh, sinh for k < h^2.
+    In both cases D is a sum of parts d_1, d_2 that do not grow, so that |s_1|^2 |d_1| + |s_2|^2 |d_2|, with
+    the roots s = -h +- j w, bounds the track's acceleration, and with it the load on friction, from now on.
+    """
+    if row[_SPEED_RATE] != 0.0 or speed == 0.0 or row[TURN] != 0.0 or row[TURN + 1] != 0.0:
+        return False
+    half, square = 0.5 * plant.damping / plant.mass, plant.stiffness / plant.mass
+    root = math.sqrt(abs(square - half * half))
+    spring, drag = plant.stiffness - plant.mass * speed * speed, plant.damping * speed
+    size = spring * spring + drag * drag
+    # The closed form divides by w; without damping there is no steady whirl at the critical speed.
+    if size == 0.0 or root <= _LEAST_ROOT * half:
+        return False
+    moment_x, moment_y, pressure = row[_UNBALANCE], row[_UNBALANCE + 1], plant.moment * speed * speed
+    for i in range(2):
+        row[_COSINE + i], row[_SINE + i] = math.cos(row[ANGLE + i]), math.sin(row[ANGLE + i])
+        moment_x, moment_y = (
+            moment_x + plant.moment * row[_COSINE + i],
+            moment_y + plant.moment * row[_SINE + i],
+        )
+    steady_x = speed * speed * (moment_x * spring + moment_y * drag) / size
+    steady_y = speed * speed * (moment_y * spring - moment_x * drag) / size
+    x, y = row[X] - steady_x, row[Y] - steady_y
+    a_x, a_y = row[X_RATE] - speed * y + half * x, row[Y_RATE] + speed * x + half * y
+    if square > half * half:
+        both = _length(a_x - root * y, a_y + root * x) + _length(a_x + root * y, a_y - root * x)
+        pull, decay = 0.5 * square * both / root, math.exp(-half * step)
+        cosine, sine = decay * math.cos(root * step), decay * math.sin(root * step) / root
+    else:
+        slow, fast = root - half, -root - half
+        pull = slow * slow * _length(a_x + root * x, a_y + root * y)
+        pull = 0.5 * (pull + fast * fast * _length(a_x - root * x, a_y - root * y)) / root
+        slow, fast = math.exp(slow * step), math.exp(fast * step)
+        cosine, sine = 0.5 * (slow + fast), 0.5 * (slow - fast) / root
+    for i in range(2):
+        across = steady_y * row[_COSINE + i] - steady_x * row[_SINE + i]
+        load = abs(row[_TORQUE + i] + pressure * across) + plant.moment * pull
+        if row[FLAG + i] != LOCKED and not load <= plant.friction_arm[i] * pressure:
+            return False
+    later_x, later_y = cosine * x + sine * a_x, cosine * y + sine * a_y
+    shift = (half * half - square) * sine
+    rate_x = cosine * a_x + shift * x - half * later_x + speed * later_y
+    rate_y = cosine * a_y + shift * y - half * later_y - speed * later_x
+    cosine, sine = math.cos(speed * step), math.sin(speed * step)
+    row[X], row[Y] = (
+        steady_x + cosine * later_x + sine * later_y,
+        steady_y + cosine * later_y - sine * later_x,
+    )
+    row[X_RATE], row[Y_RATE] = cosine * rate_x + sine * rate_y, cosine * rate_y - sine * rate_x
+    for i in range(2):
+        if row[FLAG + i] != LOCKED:
+            row[FLAG + i] = STUCK
     return True
 
 
 @in_place
-def _moving(flag: int, rate: float) -> int:
-    """Motion of a mass that is locked or has a rate."""
-    if flag == LOCKED or rate == 0.0:
-        return HELD
-    return FORWARDS if rate > 0.0 else BACKWARDS
+def _set_inputs(plant: PlantParameters, row: FloatArray, speed_rate: float) -> None:
+    """Write what is constant within a step: speed rate, imbalance, torques of the motors at standstill."""
+    row[_SPEED_RATE] = speed_rate
+    row[_UNBALANCE] = plant.unbalance * math.cos(plant.phase)
+    row[_UNBALANCE + 1] = plant.unbalance * math.sin(plant.phase)
+    for i in range(2):
+        voltage = min(max(row[VOLTAGE + i], -plant.maximum_voltage), plant.maximum_voltage)
+        row[VOLTAGE + i], row[_TORQUE + i] = voltage, plant.drive_gain * voltage
+        row[_BEFORE + i] = row[ANGLE + i]
+        if row[FLAG + i] == LOCKED:
+            row[TURN + i] = 0.0
 
 
 @in_place
-def motions(torques: _Torques, state: FloatArray, stuck: IntArray) -> Motions:
-    """Motion of each mass: HELD, FORWARDS or BACKWARDS."""
-    loose = (stuck[0] != LOCKED and state[6] == 0.0, stuck[1] != LOCKED and state[7] == 0.0)
-    present = (_moving(stuck[0], state[6]), _moving(stuck[1], state[7]))
-    for first in (HELD, FORWARDS, BACKWARDS):
-        for second in (HELD, FORWARDS, BACKWARDS):
-            motion = (first if loose[0] else present[0], second if loose[1] else present[1])
-            if _consistent(torques, motion, loose):
-                return motion
-    # Reached by round-off only: the torques are at their bounds.
-    return present
-
-
-SIZE: Final = 8
-
-
-class Drive(NamedTuple):
-    """Inputs of the plant during one step."""
-
-    unbalance_x: float
-    """U cos phi_m, kg m."""
-    unbalance_y: float
-    """U sin phi_m, kg m."""
-    torque: Pair
-    """Torque of each motor at standstill, B_add V, N m."""
-    rate: float
-    """W', rad/s^2, constant."""
-
-
-class _Loads(NamedTuple):
-    """Forces on rotor and masses in one state of the plant."""
-
-    force_x: float
-    """All but M a_x and b phi_i'' sin phi_i in the first equation, N."""
-    force_y: float
-    """All but M a_y and b phi_i'' cos phi_i in the second equation, N."""
-    torques: _Torques
-
-
-@in_place
-def _limited(voltage: float, maximum: float) -> float:
-    """Voltage limited to the supply's maximum, which may be infinite, V."""
-    return min(max(voltage, -maximum), maximum)
-
-
-@in_place
-def drive_of(parameters: PlantParameters, command: FloatArray, rate: float) -> Drive:
-    """Gather the inputs of the plant."""
-    most, gain = parameters.maximum_voltage, parameters.drive_gain
-    return Drive(
-        parameters.unbalance * math.cos(parameters.phase),
-        parameters.unbalance * math.sin(parameters.phase),
-        (gain * _limited(command[0], most), gain * _limited(command[1], most)),
-        rate,
-    )
-
-
-@in_place
-def loads(parameters: PlantParameters, state: FloatArray, speed: float, drive: Drive) -> _Loads:
-    """Forces on the rotor, and the masses' equations with the rotor's accelerations eliminated.
-
-    A phi'' = g - friction, with A_ij = (J + J_add) delta_ij - b^2 / M cos(phi_i - phi_j) and
-    g_i = u_i - J W' - b / M (-F_x sin phi_i + F_y cos phi_i).
-    """
-    b, rate = parameters.moment, drive.rate
-    cos_1, sin_1 = math.cos(state[4]), math.sin(state[4])
-    cos_2, sin_2 = math.cos(state[5]), math.sin(state[5])
-    square_1, square_2 = (speed + state[6]) ** 2, (speed + state[7]) ** 2
-    force_x = b * (square_1 * cos_1 + rate * sin_1 + square_2 * cos_2 + rate * sin_2)
-    force_y = b * (square_1 * sin_1 - rate * cos_1 + square_2 * sin_2 - rate * cos_2)
-    force_x += speed * speed * drive.unbalance_x + rate * drive.unbalance_y
-    force_y += speed * speed * drive.unbalance_y - rate * drive.unbalance_x
-    force_x -= parameters.damping * (state[2] - speed * state[1]) + parameters.stiffness * state[0]
-    force_y -= parameters.damping * (state[3] + speed * state[0]) + parameters.stiffness * state[1]
-    lever, common, drag = b / parameters.mass, parameters.inertia * rate, parameters.drive_damping
-    drive_1 = drive.torque[0] - drag * state[6] - common
-    drive_2 = drive.torque[1] - drag * state[7] - common
-    torques = _Torques(
-        parameters.inertia + parameters.drive_inertia - b * lever,
-        -b * lever * (cos_1 * cos_2 + sin_1 * sin_2),
-        (
-            drive_1 - lever * (force_y * cos_1 - force_x * sin_1),
-            drive_2 - lever * (force_y * cos_2 - force_x * sin_2),
-        ),
-        (parameters.friction_arm[0] * b * square_1, parameters.friction_arm[1] * b * square_2),
-    )
-    return _Loads(force_x, force_y, torques)
-
-
-@in_place
-def write_derivative(
-    parameters: PlantParameters,
-    state: FloatArray,
-    speed: float,
-    drive: Drive,
-    motion: Motions,
-    out: FloatArray,
-) -> None:
-    """Write the time derivative of the state for given motions of the masses."""
-    load = loads(parameters, state, speed, drive)
-    first, second = angular_accelerations(load.torques, motion)
-    b, rate = parameters.moment, drive.rate
-    pull_x = b * (math.sin(state[4]) * first + math.sin(state[5]) * second)
-    pull_y = b * (math.cos(state[4]) * first + math.cos(state[5]) * second)
-    accelerated_x = (load.force_x + pull_x) / parameters.mass
-    accelerated_y = (load.force_y - pull_y) / parameters.mass
-    out[0] = state[2]
-    out[1] = state[3]
-    out[2] = accelerated_x + 2 * speed * state[3] + rate * state[1] + speed * speed * state[0]
-    out[3] = accelerated_y - 2 * speed * state[2] - rate * state[0] + speed * speed * state[1]
-    out[4] = state[6]
-    out[5] = state[7]
-    out[6] = first
-    out[7] = second
-
-
-def rest_state(angles: tuple[float, float]) -> FloatArray:
-    """State of a rotor at its centre, in its own frame, with masses at rest on the track, shape (8,)."""
-    return np.array([0.0, 0.0, 0.0, 0.0, angles[0], angles[1], 0.0, 0.0])
-
-
-def stuck_flags(flag: int) -> IntArray:
-    """One flag for both masses, shape (2,)."""
-    return np.full(2, flag, dtype=np.int64)
-
-
-@in_place
-def electrical_energy(
-    parameters: PlantParameters, before: FloatArray, after: FloatArray, command: FloatArray, step: float
+def plant_step(
+    plant: PlantParameters, row: FloatArray, speed: float, speed_rate: float, step: float
 ) -> float:
-    """Energy that both motors take from the supply in one step of constant voltages, J.
+    """Integrate state and flags of a row over one step, with its voltages, the speed linear in time.
 
-    E = sum V (V h - K_m n (phi(t + h) - phi(t))) / R_m, the exact integral of V i; negative when a motor
-    feeds back.
-    Source: Kirchhoff's law for the motor without inductance, Eqs. (A1) to (A3) of the paper on eccentric
-    masses.
+    Returns: Energy that both motors take from the supply, J: sum V (V h - K_m n (phi(t + h) - phi(t))) / R_m,
+    the exact integral of V i; negative when a motor feeds back.
+    Range: the masses are points on the track; contact between them is not modelled.
+    Source: Dormand and Prince (1980), the fifth-order formula; Kirchhoff's law for the motor without
+    inductance, Eqs. (A1) to (A3) of the paper on eccentric masses.
     """
-    total = 0.0
-    for mass in range(2):
-        voltage = _limited(command[mass], parameters.maximum_voltage)
-        turned = parameters.gear_ratio * (after[4 + mass] - before[4 + mass])
-        total += voltage * (voltage * step - parameters.back_emf_constant * turned) / parameters.resistance
-    return total
+    _set_inputs(plant, row, speed_rate)
+    if not _held_step(plant, row, speed, step):
+        parts = substeps(plant, speed, speed_rate, step)
+        for part in range(parts):
+            _advance(plant, row, speed + speed_rate * (step / parts) * part, step / parts)
+    energy = 0.0
+    for i in range(2):
+        back = plant.back_emf_constant * plant.gear_ratio * (row[ANGLE + i] - row[_BEFORE + i])
+        energy += row[VOLTAGE + i] * (row[VOLTAGE + i] * step - back) / plant.resistance
+    return energy

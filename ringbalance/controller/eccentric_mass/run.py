@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from ringbalance.controller.balancer import Progress
-from ringbalance.controller.eccentric_mass.integration import check_substeps, intervals, plant_step
 from ringbalance.controller.eccentric_mass.memory import (
     HISTORY,
     LOCKED_MASSES,
@@ -18,13 +17,22 @@ from ringbalance.controller.eccentric_mass.memory import (
     EccentricMeasurement,
 )
 from ringbalance.controller.eccentric_mass.plant import (
+    ANGLE,
     LOCKED,
+    MAX_RATE_PRODUCT,
+    SIZE,
     STUCK,
+    TURN,
+    VOLTAGE,
+    X_RATE,
+    Y_RATE,
     PlantParameters,
-    electrical_energy,
-    rest_state,
+    X,
+    Y,
+    fastest_rate,
+    plant_row,
+    plant_step,
     speed_at,
-    stuck_flags,
     turned,
 )
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
@@ -33,8 +41,10 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.step import begin_strategy, strategy_step
 from ringbalance.results.result import Presentation
-from ringbalance.scene.arrays import FloatArray, IntArray, Record
+from ringbalance.scene.arrays import FloatArray, Record
+from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.platform.compiled import compiled
+from ringbalance.scene.units import format_quantity
 
 Seed = int | np.random.Generator | None
 """Seed of random numbers, or their generator."""
@@ -81,12 +91,12 @@ class _Machine(NamedTuple):
 
 @compiled
 def _measure(
-    machine: _Machine, settings: StrategySettings, state: FloatArray, time: float, numbers: FloatArray
+    machine: _Machine, settings: StrategySettings, row: FloatArray, time: float, numbers: FloatArray
 ) -> EccentricMeasurement:
     """Sample of the sensors, with noise. Args: `numbers`: standard normal deviates, shape (8,)."""
     speed, speed_rate = speed_at(machine.times, machine.speeds, time)
     turn = turned(machine.times, machine.speeds, time)
-    position, velocity = complex(state[0], state[1]), complex(state[2], state[3])
+    position, velocity = complex(row[X], row[Y]), complex(row[X_RATE], row[Y_RATE])
     if settings.laboratory:
         outward = complex(math.cos(turn), math.sin(turn))
         velocity = outward * (velocity + complex(0.0, speed) * position)
@@ -94,8 +104,8 @@ def _measure(
     position += complex(machine.position_noise * numbers[0], machine.position_noise * numbers[1])
     velocity += complex(machine.velocity_noise * numbers[2], machine.velocity_noise * numbers[3])
     noise, rate_noise = machine.encoder_noise, machine.encoder_rate_noise
-    angle = (state[4] + noise * numbers[4], state[5] + noise * numbers[5])
-    rate = (state[6] + rate_noise * numbers[6], state[7] + rate_noise * numbers[7])
+    angle = (row[ANGLE] + noise * numbers[4], row[ANGLE + 1] + noise * numbers[5])
+    rate = (row[TURN] + rate_noise * numbers[6], row[TURN + 1] + rate_noise * numbers[7])
     return EccentricMeasurement(time, speed, speed_rate, turn, position, velocity, angle, rate)
 
 
@@ -105,44 +115,100 @@ def _run_interval(
     machine: _Machine,
     numbers: FloatArray,
     memory: Record,
-    state: FloatArray,
-    stuck: IntArray,
+    row: FloatArray,
     history: Record,
     first: int,
     after: int,
-) -> tuple[FloatArray, IntArray]:
-    """Run samples `first` to `after - 1`, each followed by a step of the plant, into the history.
-
-    Returns: State and flags of the plant at sample `after`.
-    """
-    plant, step, voltage = machine.plant, settings.step, np.zeros(2)
+) -> None:
+    """Run samples `first` to `after - 1`, each followed by a step of the plant, into the history."""
     energy = 0.0 if first == 0 else history[first - 1].energy
     for i in range(first, after):
-        measurement = _measure(machine, settings, state, i * step, numbers[i])
+        measurement = _measure(machine, settings, row, i * settings.step, numbers[i])
         if machine.locked:
             memory.cause, memory.hold = LOCKED_MASSES, RELEASED
-            memory.goal[0], memory.goal[1] = state[4], state[5]
+            memory.goal[0], memory.goal[1] = row[ANGLE], row[ANGLE + 1]
         else:
             strategy_step(settings, memory, measurement)
-            voltage[0], voltage[1] = memory.voltage[0], memory.voltage[1]
-        row = history[i]
-        row.stage, row.cause, row.hold = memory.stage, memory.cause, memory.hold
+        sample = history[i]
+        sample.stage, sample.cause, sample.hold = memory.stage, memory.cause, memory.hold
         # Element by element: numba takes ten times as long to compile an array assignment.
-        for k in range(8):
-            row.state[k] = state[k]
+        for k in range(SIZE):
+            sample.state[k] = row[k]
         for k in range(2):
-            row.voltage[k], row.goal[k] = memory.voltage[k], memory.goal[k]
-            row.friction_arm[k] = memory.friction[k].arm
-            row.friction_variance[k] = memory.friction[k].arm_variance
-            row.imbalance[k] = memory.filter.state[4 + k]
+            sample.voltage[k], sample.goal[k] = memory.voltage[k], memory.goal[k]
+            sample.friction_arm[k] = memory.friction[k].arm
+            sample.friction_variance[k] = memory.friction[k].arm_variance
+            sample.imbalance[k] = memory.filter.state[4 + k]
             for m in range(2):
-                row.imbalance_covariance[k, m] = memory.filter.covariance[4 + k, 4 + m]
-        speed, rate = measurement.speed, measurement.speed_rate
-        later, stuck = plant_step(plant, state, stuck, voltage, speed, rate, step)
-        energy += electrical_energy(plant, state, later, voltage, step)
-        row.energy = energy
-        state = later
-    return state, stuck
+                sample.imbalance_covariance[k, m] = memory.filter.covariance[4 + k, 4 + m]
+            row[VOLTAGE + k] = memory.voltage[k]
+        energy += plant_step(machine.plant, row, measurement.speed, measurement.speed_rate, settings.step)
+        sample.energy = energy
+
+
+MAX_SUBSTEPS: Final = 30_000_000
+"""Substeps of a run of about one minute, at 2 us each."""
+MAX_SAMPLES: Final = 2_000_000
+"""Samples whose histories take about 500 MB."""
+_INTERVAL_SUBSTEPS: Final = 50_000
+"""Substeps between two reports of progress, some 0.1 s."""
+
+
+def _substeps_of(scene: EccentricScene) -> float:
+    """Substeps of a whole run, estimated from the speed at no more than 10,000 instants.
+
+    Raises: SceneError: more than `MAX_SAMPLES`, or more than `MAX_SUBSTEPS`; it names the key of the fastest
+    rate and what is allowed.
+    """
+    duration, plant = scene.run.time_limit, PlantParameters.of(scene)
+    times, speeds = scene.rotor.profile
+    instants = np.linspace(0.0, duration, min(scene.samples, 10_000))
+    rates = np.abs(np.interp(instants, times, speeds)) + fastest_rate(plant, 0.0)
+    each = np.maximum(np.ceil(rates * scene.sensor.step / MAX_RATE_PRODUCT), 1.0)
+    count = scene.samples * float(np.mean(each))
+    samples = duration / scene.sensor.step + 1
+    if samples > MAX_SAMPLES:
+        path, value, dimension, unit = "run.time_limit", duration, "time", "s"
+        problem = f"the run would take {samples:.3g} samples, and {MAX_SAMPLES:.3g} are the most"
+        allowed = f"at most {scene.sensor.step * (MAX_SAMPLES - 1):.4g} s, or a longer sensor.step"
+    elif count > MAX_SUBSTEPS:
+        # Half of the allowed substeps: the other rates need the rest.
+        rate, resistance = 0.5 * MAX_SUBSTEPS * MAX_RATE_PRODUCT / duration, scene.motor.resistance
+        least = plant.inertia + plant.drive_inertia - 2 * plant.moment**2 / plant.mass
+        drive, fastest = plant.drive_damping / least, float(np.max(np.abs(speeds)))
+        rates_of = [
+            (
+                math.sqrt(plant.stiffness / plant.mass),
+                "rotor.stiffness",
+                plant.stiffness,
+                plant.mass * rate**2,
+                "stiffness",
+                "N/m",
+            ),
+            (
+                plant.damping / plant.mass,
+                "rotor.damping",
+                plant.damping,
+                plant.mass * rate,
+                "damping",
+                "N*s/m",
+            ),
+            (fastest, "rotor.speed_profile", fastest, rate, "speed", "rpm"),
+            (drive, "motor.resistance", resistance, resistance * drive / rate, "resistance", "ohm"),
+        ]
+        _, path, value, limit, dimension, unit = max(rates_of)
+        problem = (
+            f"the run would take {count:.3g} steps of the integration, and {MAX_SUBSTEPS:.3g} are the most"
+        )
+        bound = "at least" if unit == "ohm" else "at most"
+        allowed = f"{bound} {format_quantity(limit, dimension, unit, digits=3)}, or a shorter run.time_limit"
+    else:
+        return count
+    table, _, key = path.partition(".")
+    text = format_quantity(value, dimension, unit)
+    raise SceneError(
+        [Fault(file=scene.file, table=table, key=key, value=text, problem=problem, allowed=allowed)]
+    )
 
 
 def simulate_eccentric(
@@ -161,17 +227,17 @@ def simulate_eccentric(
     Raises: SceneError: a run that takes too many samples or steps.
     Source: Fig. 3 of the paper on eccentric masses.
     """
-    check_substeps(scene)
+    size = max(1, round(_INTERVAL_SUBSTEPS * scene.samples / _substeps_of(scene)))
     settings, machine = settings or StrategySettings.of(scene), _Machine.of(scene)
     history, memory = np.zeros(scene.samples, dtype=HISTORY), np.zeros(1, dtype=MEMORY)
     random = np.random.default_rng(scene.run.seed if seed is None else seed)
     numbers = random.standard_normal((scene.samples, SENSOR_NOISES))
-    state = rest_state(scene.masses.initial_angle)
-    stuck = stuck_flags(LOCKED if machine.locked else STUCK)
+    row = plant_row(scene.masses.initial_angle, LOCKED if machine.locked else STUCK)
     if not machine.locked:
-        begin_strategy(settings, memory[0], _measure(machine, settings, state, 0.0, numbers[0]))
-    for begin, end in intervals(scene):
-        state, stuck = _run_interval(settings, machine, numbers, memory[0], state, stuck, history, begin, end)
+        begin_strategy(settings, memory[0], _measure(machine, settings, row, 0.0, numbers[0]))
+    for begin in range(0, scene.samples, size):
+        end = min(begin + size, scene.samples)
+        _run_interval(settings, machine, numbers, memory[0], row, history, begin, end)
         if progress is not None:
             progress(end * settings.step, scene.run.time_limit)
         part = history[begin:end]

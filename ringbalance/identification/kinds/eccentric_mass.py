@@ -8,8 +8,18 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.integration import plant_step, substeps
-from ringbalance.controller.eccentric_mass.plant import LOCKED, STUCK, PlantParameters, rest_state
+from ringbalance.controller.eccentric_mass.plant import (
+    ANGLE,
+    FLAG,
+    LOCKED,
+    VOLTAGE,
+    PlantParameters,
+    X,
+    Y,
+    plant_row,
+    plant_step,
+    substeps,
+)
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.kinds.kind import (
     Grid,
@@ -55,17 +65,16 @@ def _positions(scene: EccentricScene, observations: Observations, _: object) -> 
     plant, angles = PlantParameters.of(scene), scene.masses.initial_angle
     moved, times = np.empty(len(observations)), observations.columns["time"]
     for motion, rows in _motions(observations):
-        speed, moves = float(motion.speed), np.arange(2) == motion.mass
-        state, flags = rest_state(angles), np.where(moves, STUCK, LOCKED)
+        speed, state = float(motion.speed), plant_row(angles)
+        state[FLAG + 1 - motion.mass], state[VOLTAGE + motion.mass] = LOCKED, motion.voltage
         whirl = plant.steady_whirl(speed, angles) if speed else 0j
-        state[0], state[1] = whirl.real, whirl.imag
-        command, now = motion.voltage * moves, 0.0
+        state[X], state[Y], now = whirl.real, whirl.imag, 0.0
         for row, time in zip(rows.tolist(), times[rows].tolist(), strict=True):
             calls = math.ceil(substeps(plant, speed, 0.0, time - now) / _MOST_SUBSTEPS) if time > now else 0
             for _ in range(calls):
-                state, flags = plant_step(plant, state, flags, command, speed, 0.0, (time - now) / calls)
+                plant_step(plant, state, speed, 0.0, (time - now) / calls)
             now = time
-            moved[row] = state[4 + motion.mass] - angles[motion.mass]
+            moved[row] = state[ANGLE + motion.mass] - angles[motion.mass]
     return moved
 
 

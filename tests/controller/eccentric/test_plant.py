@@ -8,19 +8,15 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from plant_runs import run_steps
+from plant_runs import rest_state, row_of, run_steps, stuck_flags
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.eccentric_mass import integration
+from ringbalance.controller.eccentric_mass import plant as machine
 from ringbalance.controller.eccentric_mass.plant import (
     LOCKED,
     SLIDING,
     PlantParameters,
-    drive_of,
-    electrical_energy,
-    rest_state,
     speed_at,
-    stuck_flags,
     turned,
 )
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
@@ -155,12 +151,10 @@ def test_the_order_is_five(parameters: PlantParameters) -> None:
         count = round(1.0 / step)
         state = rest_state(ANGLES)
         state[6:] = [1.0, -0.5]
-        work, trial = np.empty((7, 8)), np.empty(8)
-        from_plant = drive_of(smooth, np.array([1.0, -2.0]), 3.0)
+        row = row_of(smooth, state, stuck_flags(SLIDING), np.array([1.0, -2.0]), rate=3.0)
         for i in range(count):
-            stuck = stuck_flags(SLIDING)
-            integration._advance(smooth, state, stuck, 12.0 + 3.0 * i * step, from_plant, step, work, trial)
-        return state
+            machine._advance(smooth, row, 12.0 + 3.0 * i * step, step)
+        return row[:8]
 
     steps = np.array([1 / 80, 1 / 160, 1 / 320])
     exact = end(1 / 6400)
@@ -175,25 +169,20 @@ def test_electrical_energy_is_the_integral_of_power(parameters: PlantParameters)
     step, count = 1e-4, 5000
     command = np.array([3.0, -2.0])
     free = without_friction(parameters)
-    states, _ = run_steps(
-        free,
-        np.array([0.0]),
-        np.array([10.0]),
-        rest_state(ANGLES),
-        stuck_flags(SLIDING),
-        np.tile(command, (count, 1)),
-        step,
-    )
-    rates = 40.0 * states[:, 6:8]
-    power = (command * (command - 0.01 * rates) / 1.0).sum(axis=1)
-    total = np.sum((power[1:] + power[:-1]) / 2) * step
-    assert electrical_energy(free, states[0], states[-1], command, count * step) == pytest.approx(
-        total, rel=1e-6
-    )
-    held = rest_state(ANGLES)
-    assert electrical_energy(free, held, held, command, 2.0) == pytest.approx((9 + 4) * 2.0)
-    weak = free._replace(maximum_voltage=1.0)
-    assert electrical_energy(weak, held, held, command, 2.0) == pytest.approx(2 * 2.0)
+    row, total = row_of(free, rest_state(ANGLES), stuck_flags(SLIDING), command), 0.0
+    rates = [row[6:8].copy()]
+    for _ in range(count):
+        total += machine.plant_step(free, row, 10.0, 0.0, step)
+        rates.append(row[6:8].copy())
+    power = (command * (command - 0.01 * 40.0 * np.array(rates)) / 1.0).sum(axis=1)
+    assert total == pytest.approx(np.sum((power[1:] + power[:-1]) / 2) * step, rel=1e-6)
+
+    def held(plant: PlantParameters) -> float:
+        row = row_of(plant, rest_state(ANGLES), stuck_flags(LOCKED), command)
+        return machine.plant_step(plant, row, 10.0, 0.0, 2.0)
+
+    assert held(free) == pytest.approx((9 + 4) * 2.0)
+    assert held(free._replace(maximum_voltage=1.0)) == pytest.approx(2 * 2.0)
 
 
 def test_motor_equations_by_shaft_and_gear(parameters: PlantParameters) -> None:

@@ -11,28 +11,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plant_runs import run_steps
+from plant_runs import plant_step, rest_state, row_of, run_steps, stuck_flags
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.eccentric_mass.integration import _held_step, plant_step
-from ringbalance.controller.eccentric_mass.plant import (
-    BACKWARDS,
-    FORWARDS,
-    HELD,
-    LOCKED,
-    SLIDING,
-    STUCK,
-    Drive,
-    PlantParameters,
-    _Torques,
-    angular_accelerations,
-    drive_of,
-    motions,
-    rest_state,
-    stuck_flags,
-    write_derivative,
-)
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.controller.eccentric_mass import plant as machine
+from ringbalance.controller.eccentric_mass.plant import LOCKED, SLIDING, STUCK, PlantParameters
+from ringbalance.scene.arrays import FloatArray
 
 RPM = math.pi / 30
 OFF = np.zeros(2)
@@ -54,7 +38,7 @@ def at_rest_on(parameters: PlantParameters, speed: float, angles: tuple[float, f
 
 def steps(
     parameters: PlantParameters, state: FloatArray, speed: float, commands: FloatArray, step: float = 1e-3
-) -> tuple[FloatArray, IntArray]:
+) -> tuple[FloatArray, FloatArray]:
     return run_steps(
         parameters, np.array([0.0]), np.array([speed]), state, stuck_flags(SLIDING), commands, step
     )
@@ -214,19 +198,25 @@ def test_friction_never_gives_energy(parameters: PlantParameters) -> None:
     assert energy[-1] < 0.1 * energy[0]
 
 
-def consistent_motions(torques: _Torques) -> Iterator[tuple[int, int]]:
-    """All combinations that the law of friction allows, by its definition."""
-    most = torques.friction
-    ways = (HELD, FORWARDS, BACKWARDS)
-    for motion in product(ways, ways):
-        a = angular_accelerations(torques, motion)
-        needed = (
-            torques.driving[0] - torques.inertia * a[0] - torques.cross * a[1],
-            torques.driving[1] - torques.inertia * a[1] - torques.cross * a[0],
-        )
-        held = all(abs(needed[i]) <= most[i] for i in range(2) if motion[i] == HELD)
-        if held and all(motion[i] * a[i] > 0 for i in range(2) if motion[i] != HELD):
-            yield motion[0], motion[1]
+def accelerations_in(
+    parameters: PlantParameters, row: FloatArray, motion: tuple[float, float]
+) -> tuple[float, float]:
+    """phi'' of both masses in a motion, from the loads in the row."""
+    row[machine._MOTION : machine._MOTION + 2] = motion
+    machine._set_accelerations(parameters, row)
+    return float(row[machine._ACCELERATION]), float(row[machine._ACCELERATION + 1])
+
+
+def consistent_motions(parameters: PlantParameters, row: FloatArray) -> Iterator[tuple[float, float]]:
+    """Accelerations in all combinations that the law of friction allows, by its definition."""
+    most, driving = row[machine._FRICTION :], row[machine._DRIVING :]
+    inertia = parameters.inertia + parameters.drive_inertia - parameters.moment**2 / parameters.mass
+    for motion in product((0.0, 1.0, -1.0), (0.0, 1.0, -1.0)):
+        a = accelerations_in(parameters, row, motion)
+        needed = [driving[i] - inertia * a[i] - row[machine._CROSS] * a[1 - i] for i in range(2)]
+        held = all(abs(needed[i]) <= most[i] for i in range(2) if motion[i] == 0)
+        if held and all(motion[i] * a[i] > 0 for i in range(2) if motion[i] != 0):
+            yield a
 
 
 @given(
@@ -236,27 +226,35 @@ def consistent_motions(torques: _Torques) -> Iterator[tuple[int, int]]:
 )
 @settings(max_examples=150, deadline=None, derandomize=True)
 def test_the_motion_from_rest_is_the_one_that_the_law_allows(
-    driving: tuple[float, float], friction: tuple[float, float], cross: float
+    driving: tuple[float, float],
+    friction: tuple[float, float],
+    cross: float,
+    parameters: PlantParameters,
 ) -> None:
-    torques = _Torques(1.0, cross, driving, friction)
-    motion = motions(torques, rest_state((0.0, 1.0)), stuck_flags(STUCK))
-    accelerations = angular_accelerations(torques, motion)
+    unit = parameters._replace(inertia=1.0, drive_inertia=0.0, mass=1e12)
+    row = row_of(unit, rest_state((0.0, 1.0)), stuck_flags(STUCK), OFF)
+    row[machine._DRIVING : machine._DRIVING + 2], row[machine._CROSS] = driving, cross
+    row[machine._FRICTION : machine._FRICTION + 2] = friction
+    machine._set_motion(unit, row)
+    chosen = row[machine._ACCELERATION : machine._ACCELERATION + 2].copy()
+    moves = row[machine._MOTION : machine._MOTION + 2] != 0
+    np.testing.assert_array_equal(row[machine.FLAG : machine.FLAG + 2], np.where(moves, SLIDING, STUCK))
     # At the bound of the torque two motions are the same: what counts is the acceleration.
-    for allowed in consistent_motions(torques):
-        assert angular_accelerations(torques, allowed) == pytest.approx(accelerations, abs=1e-9)
+    for allowed in consistent_motions(unit, row):
+        assert allowed == pytest.approx(chosen, abs=1e-9)
 
 
-def carried(
-    parameters: PlantParameters, state: FloatArray, speed: float, drive: Drive, time: float
-) -> FloatArray:
+def carried(parameters: PlantParameters, row: FloatArray, speed: float, time: float) -> FloatArray:
     """The state of held masses by an adaptive solution of the plant's own equations."""
+    work = row.copy()
+    work[machine._MOTION : machine._MOTION + 2] = 0.0
 
     def rates(_: float, now: FloatArray) -> FloatArray:
-        out = np.empty(8)
-        write_derivative(parameters, now, speed, drive, (HELD, HELD), out)
-        return out
+        work[:8] = now
+        machine._set_slope(parameters, work, 0, speed, machine._SLOPES)
+        return work[machine._SLOPES : machine._SLOPES + 8].copy()
 
-    solution = solve_ivp(rates, (0.0, time), state, method="DOP853", rtol=1e-12, atol=1e-16)
+    solution = solve_ivp(rates, (0.0, time), row[:8], method="DOP853", rtol=1e-12, atol=1e-16)
     return np.asarray(solution.y[:, -1])
 
 
@@ -266,10 +264,31 @@ def test_a_step_with_held_masses_is_exact(damping: float, parameters: PlantParam
     rotor = parameters._replace(damping=damping, friction_arm=(1e3, 1e3))
     speed, state = 150 * RPM, rest_state((0.4, 2.9))
     state[:4] = 1e-3, -2e-3, 0.01, 0.02
-    drive, after, stuck = drive_of(rotor, np.array([0.01, -0.02]), 0.0), state.copy(), stuck_flags(SLIDING)
-    assert _held_step(rotor, after, stuck, speed, drive, 0.3)
-    np.testing.assert_allclose(after, carried(rotor, state, speed, drive, 0.3), rtol=1e-9, atol=1e-13)
-    assert np.all(stuck == STUCK)
+    row = row_of(rotor, state, stuck_flags(SLIDING), np.array([0.01, -0.02]))
+    expected = carried(rotor, row, speed, 0.3)
+    assert machine._held_step(rotor, row, speed, 0.3)
+    np.testing.assert_allclose(row[:8], expected, rtol=1e-9, atol=1e-13)
+    assert np.all(row[machine.FLAG : machine.FLAG + 2] == STUCK)
+
+
+@pytest.mark.parametrize("damping", [0.0, 20.0, 3000.0])
+def test_the_bound_on_the_load_of_held_masses_holds(damping: float, parameters: PlantParameters) -> None:
+    """Masses taken as held stay so on the plant's own equations, however often the friction is halved."""
+    speed, state = 150 * RPM, rest_state((0.4, 2.9))
+    state[:4] = 1e-3, -2e-3, 0.01, 0.02
+    arm, held = 4.0, 0
+    while arm > 1e-5:
+        arm *= 0.9
+        rotor = parameters._replace(damping=damping, friction_arm=(arm, arm))
+        row = row_of(rotor, state, stuck_flags(STUCK), OFF)
+        if not machine._held_step(rotor, row.copy(), speed, 1e-3):
+            break
+        held += 1
+        for _ in range(2000):
+            machine._advance(rotor, row, speed, 1e-3)
+            assert np.all(row[machine.FLAG : machine.FLAG + 2] == STUCK), arm
+    assert held > 3
+    assert arm > 1e-5
 
 
 def test_masses_that_the_transient_could_break_loose_are_not_taken_as_held(
@@ -280,11 +299,12 @@ def test_masses_that_the_transient_could_break_loose_are_not_taken_as_held(
     whirl = parameters.steady_whirl(speed, angles)
     arm = 1.5 * max(abs((whirl * cmath.exp(-1j * angle)).imag) for angle in angles)
     rotor = parameters._replace(friction_arm=(arm, arm))
-    drive, step = drive_of(rotor, OFF, 0.0), 1e-3
     settled, shaken = at_rest_on(rotor, speed, angles), rest_state(angles)
-    assert _held_step(rotor, settled, stuck_flags(STUCK), speed, drive, step)
-    before = shaken.copy()
-    assert not _held_step(rotor, shaken, stuck_flags(STUCK), speed, drive, step)
-    assert not _held_step(rotor, shaken, stuck_flags(STUCK), speed, drive._replace(rate=1.0), step)
-    np.testing.assert_array_equal(shaken, before)
-    assert _held_step(rotor, shaken, stuck_flags(LOCKED), speed, drive, step)
+    stuck, step = stuck_flags(STUCK), 1e-3
+    assert machine._held_step(rotor, row_of(rotor, settled, stuck, OFF), speed, step)
+    before = row_of(rotor, shaken, stuck, OFF)
+    row = before.copy()
+    assert not machine._held_step(rotor, row, speed, step)
+    assert not machine._held_step(rotor, row_of(rotor, shaken, stuck, OFF, rate=1.0), speed, step)
+    np.testing.assert_array_equal(row[:10], before[:10])
+    assert machine._held_step(rotor, row_of(rotor, shaken, stuck_flags(LOCKED), OFF), speed, step)

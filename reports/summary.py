@@ -60,16 +60,18 @@ def common_causes(cases: list[Record]) -> list[Record]:
 
 def tallies(evidence: Record) -> Record:
     """Numbers of claims, of checks and of comparisons with measurements by verdict."""
-    judged, checked = claims(evidence), checks(evidence)
-    measured = [case for case in checked if case["kind"] == "validation"]
-    run = [case for case in checked if case not in measured and case["verdict"] != "not run"]
+    judged = claims(evidence)
+    measured = [case for case in checks(evidence) if case["kind"] == "validation"]
+    own = [case for case in checks(evidence) if case not in measured]
+    run = [case for case in own if case["verdict"] != "not run"]
     return {
         "claims": verdict_counts(judged, CLAIM_VERDICTS),
         "claims_elsewhere": sum(elsewhere(case, evidence) for case in judged),
-        "checks": verdict_counts(checked, CHECK_VERDICTS),
+        "checks": verdict_counts(own, CHECK_VERDICTS),
         "checks_run": len(run),
         "checks_passed": sum(case["verdict"] == "passed" for case in run),
         "measured": len(measured),
+        "measured_not_run": sum(case["verdict"] == "not run" for case in measured),
         "measured_confirmed": sum(case["verdict"] == "confirmed" for case in measured),
     }
 

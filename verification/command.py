@@ -122,7 +122,7 @@ def _print_judgement(document: Mapping[str, Any]) -> None:
     rows = Rows(
         title=f"{document['title']}  {document['verdict']} ({document['source']})",
         quantities=(),
-        facts=[("confirmed", f"where at least {percent(document['limit'])} lie within both intervals")]
+        facts=[("rule", f"confirmed where at least {percent(document['limit'])} lie within both intervals")]
         + ([("but", document["hint"])] if document["hint"] else []),
         tables=(Table(heads=("series", "points", "bias", "within"), rows=lines),),
         listed=0,

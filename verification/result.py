@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Self
 
-from ringbalance.results.numbers import format_given
+from ringbalance.results.numbers import format_given, percent
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.verification.assumptions import Assumption
@@ -107,13 +107,18 @@ class QuantityResult:
         )
 
     def cells(self) -> tuple[str, ...]:
-        """Title, number, reference or limit, half-width of the deviation, and verdict."""
+        """Title, number, reference and limit, half-width of the deviation, and verdict."""
         quantity, unit, number = self.quantity, self.quantity.unit, self.number
         bound = {"at_most": "≤ ", "at_least": "≥ "}.get(quantity.metric)
         reference = None if number is None or number.reference is None else number.reference.value
-        against = (
-            format_given(reference, unit) if bound is None else bound + format_given(quantity.limit, unit)
-        )
+        if bound is not None:
+            against = bound + format_given(quantity.limit, unit)
+        elif quantity.metric == "relative":
+            against = f"{format_given(reference, unit)} within {percent(quantity.limit)}"
+        elif quantity.metric == "absolute":
+            against = f"{format_given(reference, unit)} within {format_given(quantity.limit, unit)}"
+        else:
+            against = format_given(reference, unit)
         width = format_given(self.half_width, unit, digits=2) if self.half_width else ""
         return quantity.title, self.row().text, against, width, self.verdict.value
 
@@ -264,7 +269,7 @@ class CaseResult(Result):
             )
             for each in self.mutations
         ]
-        heads = ("quantity", "found", "reference or limit", "±", "verdict")
+        heads = ("quantity", "found", "reference and limit", "±", "verdict")
         table = Table(heads=heads, rows=[each.cells() for each in self.quantities] if run else [])
         return Rows(
             title=f"{definition.id}  {kind_text(definition)}  {self.verdict}",
@@ -277,9 +282,9 @@ class CaseResult(Result):
 
 
 def kind_text(definition: CaseDefinition) -> str:
-    """Kind and number of a case for readers: "code verification", "claim 12"."""
-    number = "" if definition.number is None else f" {definition.number}"
-    return definition.kind.replace("_", " ") + number
+    """Kind of a case for readers, with number and paper of a claim: "claim 12, liquid ring"."""
+    of_paper = f" {definition.number}, {definition.paper}" if definition.number is not None else ""
+    return (definition.kind + of_paper).replace("_", " ")
 
 
 def definition_document(definition: CaseDefinition) -> Document:
@@ -311,7 +316,8 @@ def _uncertainties(number: Found | None) -> Document:
         "value_low": number.value + low - half_width,
         "value_high": number.value + high + half_width,
         "numerical_uncertainty": COVERAGE_FACTOR * number.numerical,
-        "input_uncertainty": COVERAGE_FACTOR * parts["u_input"],
+        # Assumed inputs may lie anywhere within their ranges: their whole reach, not its standard deviation.
+        "input_uncertainty": COVERAGE_FACTOR * number.input + max(-low, high),
         "corrected": number.corrected,
         "validation": {"E": error, **parts, "u_val": math.hypot(*parts.values())},
     }

@@ -337,10 +337,9 @@ def _stated_uncertainty(
             share_of_all = _RELATIVE.read(stated)
             result = {name: share_of_all * _size(kind, columns, name) for name in measured}
         except FieldError as error:
-            allowed = (
-                'a share of the measured values such as "2 %" or 0.02 (95 %), or by column: '
-                '{ amplitude = "0.1 um", phase = "1 deg" }; absent: estimated'
-            )
+            allowed = 'a share of the measured values such as "2 %" or 0.02 (95 %)'
+            if kind.balancer:
+                allowed += ', or by column: { amplitude = "0.1 um", phase = "1 deg" }; absent: estimated'
             value = toml_text(stated)
             faults.append(data_fault(table.file, _UNCERTAINTY, error.problem, value=value, allowed=allowed))
     if _UNCERTAINTY in columns:

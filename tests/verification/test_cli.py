@@ -31,10 +31,17 @@ def test_json_is_one_clean_document(capsys: pytest.CaptureFixture[str]) -> None:
 def test_the_table_says_verdict_and_consequence(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command("verify", case_ids=("claim_12_correction_mass",), mutations=True) == 0
     words = " ".join(capsys.readouterr().out.split())
-    assert "claim_12_correction_mass claim 12 refuted" in words
+    assert "claim_12_correction_mass claim 12, liquid ring refuted" in words
     assert "Read 72 mm per transferred mass" in words
     assert "confirmed, caught" in words
     assert words.endswith("1 refuted")
+
+
+def test_the_table_shows_the_limit_that_judged(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command("verify", case_ids=("rotating_section",)) == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert "3.16228 within 15 %" in words
+    assert "\u2264 1 \u00d7 10^-5" in words
 
 
 def test_the_list_runs_nothing(capsys: pytest.CaptureFixture[str]) -> None:
@@ -129,7 +136,9 @@ def test_a_file_of_measurements_is_predicted_and_judged(
     assert code == 0, err
     assert json.loads(out)["verdict"] == "refuted"
     assert run_command("verify", data=[path]) == 0
-    assert "refuted (rig 4)" in " ".join(capsys.readouterr().out.split())
+    words = " ".join(capsys.readouterr().out.split())
+    assert "refuted (rig 4)" in words
+    assert "rule confirmed where at least" in words
 
 
 @pytest.mark.parametrize(

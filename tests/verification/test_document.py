@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.evidence import FigureCurve, Found, NotRunError, figure
-from ringbalance.verification.result import definition_document, merge_saved
+from ringbalance.verification.result import QuantityResult, definition_document, merge_saved
 from ringbalance.verification.runner import run_definition
 
 PROMISED = {"id", "kind", "verdict", "quantities"}
@@ -51,6 +52,23 @@ def test_a_bound_without_uncertainty_has_none(claim_text: str, made_up_code: Any
     bound = CaseDefinition.parse(text, source="x")
     document = run_definition(bound, made_up_code(), scene=paper_scene).to_dict()
     assert document["quantities"][0]["uncertainty"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("numerical", "known", "reach"),
+    [(0.1, 0.0, (0.0, 0.0)), (0.1, 0.2, (0.0, 0.0)), (0.1, 0.2, (-0.3, 0.5)), (0.0, 0.0, (-1.0, 0.2))],
+)
+def test_no_part_of_an_uncertainty_exceeds_the_whole(
+    claim: CaseDefinition, numerical: float, known: float, reach: tuple[float, float]
+) -> None:
+    number = Found(value=10.0, numerical=numerical, input=known).against(10.0).moved(*reach)
+    document = QuantityResult.of("claim", claim.quantity[0], number).to_dict()
+    whole = document["value_uncertainty"]
+    parts = document["numerical_uncertainty"], document["input_uncertainty"]
+    assert max(parts) <= whole <= sum(parts)
+    # The range of assumed inputs is added whole, not as the standard deviation of V&V 20.
+    assert whole == pytest.approx(2 * math.hypot(numerical, known) + max(-reach[0], reach[1]))
+    assert document["value_high"] - document["value_low"] <= 2 * whole * (1 + 1e-12)
 
 
 def test_gaps_in_a_curve_become_null(claim: CaseDefinition, made_up_code: Any, paper_scene: Scene) -> None:

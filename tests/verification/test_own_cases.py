@@ -162,6 +162,15 @@ def test_wrong_code_is_one_sentence_and_stops_no_other(
         assert word in printed.err
 
 
+def test_the_line_of_a_wrong_code_is_said_for_a_relative_folder(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _write(folder, "wrong", CODE.replace("2 + 2", "scene.no_such_table"))
+    monkeypatch.chdir(folder.parent)
+    assert run_command("verify", case_ids=("wrong",), cases=Path(folder.name)) == 2
+    assert "line 6: AttributeError" in capsys.readouterr().err
+
+
 def test_a_wrong_text_is_one_sentence_and_stops_no_other(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -76,8 +76,8 @@ class Draws:
     devices: bool = True
     """True if the inputs are drawn; False: each is as in the scene, and the noise alone differs."""
     complete: bool = True
-    """True if every run is carried out; False: the result of a run that is known not to settle is the least
-    vibration that the device can reach."""
+    """True if every run is carried out; False, in a search: the result of a run that is known not to settle
+    is the least vibration that the device can reach, and a run may end soon after it should have settled."""
     deadline: float = math.inf
     """Time at which a run above its limit may end undecided, s; without effect where every run is watched to
     its end."""

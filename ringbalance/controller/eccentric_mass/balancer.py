@@ -6,6 +6,7 @@ import cmath
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -25,6 +26,8 @@ from ringbalance.controller.balancer import (
     settles_within,
 )
 from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, EccentricDevice, device, on_rotor
+from ringbalance.controller.eccentric_mass.memory import REST, STAGE_NAMES
+from ringbalance.controller.eccentric_mass.outcome import EccentricOutcome
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.remedies import remedies_of
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
@@ -32,7 +35,6 @@ from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.run_rows import eccentric_history
 from ringbalance.controller.eccentric_mass.sampled_loops import (
     RecommendedGains,
-    advised,
     loops_document,
     loops_quantities,
     loops_status,
@@ -43,9 +45,15 @@ from ringbalance.controller.eccentric_mass.scene_records import (
     eccentric_scene,
 )
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
+from ringbalance.controller.eccentric_mass.static_answers import (
+    largest_whirl_per_imbalance,
+    static_quantities,
+    whirl_per_imbalance,
+)
 from ringbalance.controller.eccentric_mass.targets import reach_of
+from ringbalance.controller.eccentric_mass.tried_settings import trials_of
 from ringbalance.controller.rotor import CommonRotor, Rotors, rotor_fault
-from ringbalance.controller.trials import MEASURE_INPUT, DrawnInput, Information, SearchAxis, Trials
+from ringbalance.controller.trials import MEASURE_INPUT, DrawnInput, Information, Trials
 from ringbalance.results.requirements import AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
@@ -58,6 +66,8 @@ _WHIRL_DECAY_TIMES: Final = 12.0
 """Waiting time before balancing starts, in time constants of the free whirl."""
 _MAX_GAIN_FACTOR: Final = 10.0
 """Largest factor on a gain that is tried."""
+_REST_TIMES: Final = 4.0
+"""Length of the runs of a search, over the time to rest of the scene's own run."""
 _REMEDY_DEVICES: Final = 8
 """Number of devices whose runs decide which remedies are tried."""
 _SIZING_DEVICES: Final = 256
@@ -130,22 +140,28 @@ class EccentricMassBalancer(Balancer):
     ) -> Outcomes:
         scene = with_values_at(self.scene, settings)
         strategy, results = StrategySettings.of(scene), []
+        end = {} if draws.complete else {"run.time_limit": self._soon}
         for number, each in zip(draws.numbers, devices, strict=True):
             seed = run_noise(scene.run.seed, number) if draws.devices else scene.run.seed + number
-            plant = with_values_at(each.scene, settings)
+            plant = with_values_at(each.scene, {**settings, **end})
             run = simulate_eccentric(plant, seed=seed, settings=strategy, progress=progress)
-            start = plant.supervisor.start
+            start, ended, settled_at = plant.supervisor.start, run.outcome.value, run.settling_time
             amplitude = run.amplitude[run.time >= start]
+            final = run.final_amplitude
+            if end and settled_at is not None:
+                # What is left is magnified as with masses that stay where they are.
+                now = whirl_per_imbalance(plant, float(run.speed[-1]))
+                final *= largest_whirl_per_imbalance(plant, after=run.end) / now
+                if final > plant.supervisor.limit:
+                    ended, settled_at = EccentricOutcome.RISES_AGAIN.value, None
             results.append(
                 RunResult(
                     run=run,
-                    settling_time=math.inf
-                    if run.settling_time is None
-                    else max(0.0, run.settling_time - start),
+                    settling_time=math.inf if settled_at is None else max(0.0, settled_at - start),
                     final_amplitude=run.final_amplitude,
                     energy=run.electrical_energy,
                     worst_amplitude=float(np.max(amplitude)) if amplitude.size else run.worst_amplitude,
-                    ended=run.outcome.value,
+                    ended=ended,
                     usable_moment=reach_of(plant),
                     unbalance=plant.imbalance.mass * plant.imbalance.radius,
                 )
@@ -181,14 +197,23 @@ class EccentricMassBalancer(Balancer):
         return settles, residual
 
     def trials(self) -> tuple[Trials, ...]:
-        """Trials of the recommended gains of the drives, if the scene's gains have less margin; no other gain
-        decides whether masses settle."""
-        changes = advised(self.scene)
-        if all(loop.value <= loop.recommended for loop in RecommendedGains.of(self.scene).loops):
-            return ()
-        loops = SearchAxis(name="margins of the drives", levels=(0.0, 1.0), first=(0, 1))
-        kind = self.scene.balancer
-        return (Trials(kind=kind, axes=(loops,), settings=lambda at: changes if at[loops.name] else {}),)
+        """Trials of the strategy's settings; empty for locked masses."""
+        locked = self.scene.supervisor.strategy == "locked"
+        return () if locked else (trials_of(self.scene, self._own),)
+
+    @cached_property
+    def _own(self) -> EccentricRun:
+        """Run of the scene as it is."""
+        own: EccentricRun = self.run({}, AS_GIVEN, trace=True).traced[0].run
+        return own
+
+    @cached_property
+    def _soon(self) -> float:
+        """Time at which the runs of a search end, s: when the speed changes, or long after the scene's own
+        run has come to rest."""
+        rest = [each.start for each in self._own.stages if each.name == STAGE_NAMES[REST]]
+        start, steady = self.scene.supervisor.start, self.scene.steady_until or self.scene.run.time_limit
+        return min(steady, start + _REST_TIMES * (rest[0] - start)) if rest else steady
 
     def remedies(self) -> tuple[Remedy, ...]:
         """Parts of another size, and changes suited to the ways in which runs of some devices end."""
@@ -316,11 +341,8 @@ class EccentricMassBalancer(Balancer):
         )
 
     def quantities(self) -> tuple[Quantity, ...]:
-        """Reach, and the largest gains of the drives; see `Balancer`."""
-        reach = Quantity(
-            key="reach", name="usable moment in any direction", unit="kg m", value=reach_of(self.scene)
-        )
-        return (reach, *loops_quantities(RecommendedGains.of(self.scene)))
+        """Answers without a run, and the largest gains of the drives; see `Balancer`."""
+        return (*static_quantities(self.scene), *loops_quantities(RecommendedGains.of(self.scene)))
 
     def rows(self, run: EccentricRun) -> Rows:
         """Rows of a run as `simulate` prints them."""

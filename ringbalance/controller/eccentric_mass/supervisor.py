@@ -65,7 +65,7 @@ STALLED_SHARE: Final = 0.5
 """Fraction of the friction stage with a stalled mass beyond which the drive is the cause of failure."""
 _DWELL_TIME_S: Final = 0.2
 """Time for which masses must stay at their goal to count as arrived."""
-_LEAST_DRIVE_TIME_S: Final = 1.0
+LEAST_DRIVE_TIME_S: Final = 1.0
 """Shortest friction stage: long against the drive's own time constants."""
 _LONGEST_MOVE_S: Final = 10.0
 _STILL_TIME_S: Final = 1.0
@@ -183,7 +183,7 @@ def _friction(gates: Gates, memory: Record, motion: Motion, time: float) -> None
     """Estimate both friction arms until their errors are small, relative to the arms or for the arrival."""
     elapsed, precise = time - memory.entered, True
     # Without the time in which the drives start.
-    if elapsed >= 0.5 * _LEAST_DRIVE_TIME_S:
+    if elapsed >= 0.5 * LEAST_DRIVE_TIME_S:
         memory.driven += 1
         memory.stalled += 1 if min(abs(memory.rate[0]), abs(memory.rate[1])) < gates.stall_rate else 0
     for i in range(2):
@@ -200,7 +200,7 @@ def _friction(gates: Gates, memory: Record, motion: Motion, time: float) -> None
         possible = arm >= -2 * arm_deviation(memory, i)
         little = deviation * gates.moment * motion.speed**2 <= gates.friction_torque
         precise = precise and possible and (relative or little)
-    if precise and elapsed >= _LEAST_DRIVE_TIME_S:
+    if precise and elapsed >= LEAST_DRIVE_TIME_S:
         (first, second), memory.saturated, memory.left = _goal(gates, memory.angle, memory.imbalance)
         set_pair(memory.goal, first, second)
         # The first targets, for the estimated imbalance, are corrected by the mean vibration there.

@@ -120,14 +120,15 @@ def test_a_device_is_run_as_it_is_with_every_setting(paper: EccentricScene) -> N
 
 def test_tuning_gives_the_drives_their_margins_where_they_lack_them(small: EccentricScene) -> None:
     """A speed control at its edge: the devices are run with it and with half of it."""
-    assert balancer_of(small).trials() == ()
+    assert "margins of the drives" not in {axis.name for axis in balancer_of(small).trials()[0].axes}
     edge = RecommendedGains.of(small).speed
     scene = changed(small, {"friction_filter.speed_gain": 1.5 * edge.recommended})
     (trials,) = balancer_of(changed(scene, {"run.time_limit": 6.0})).trials()
-    settings = trials.settings({trials.axes[0].name: 1.0})
+    own = {axis.name: axis.levels[axis.first[-1]] for axis in trials.axes}
+    settings = trials.settings({**own, trials.axes[0].name: 1.0})
     assert settings is not None
     assert settings["friction_filter.speed_gain"] == pytest.approx(edge.recommended)
-    assert trials.settings({trials.axes[0].name: 0.0}) == {}
+    assert trials.settings({**own, trials.axes[0].name: 0.0}) == {}
 
 
 def test_too_few_devices_are_told_after_sixteen(small: EccentricScene) -> None:

@@ -199,19 +199,19 @@ class EccentricMassBalancer(Balancer):
     def trials(self) -> tuple[Trials, ...]:
         """Trials of the strategy's settings; empty for locked masses."""
         locked = self.scene.supervisor.strategy == "locked"
-        return () if locked else (trials_of(self.scene, self._own),)
+        return () if locked else (trials_of(self.scene, self._nominal),)
 
     @cached_property
-    def _own(self) -> EccentricRun:
+    def _nominal(self) -> EccentricRun:
         """Run of the scene as it is."""
-        own: EccentricRun = self.run({}, AS_GIVEN, trace=True).traced[0].run
-        return own
+        nominal: EccentricRun = self.run({}, AS_GIVEN, trace=True).traced[0].run
+        return nominal
 
     @cached_property
     def _soon(self) -> float:
         """Time at which the runs of a search end, s: when the speed changes, or long after the scene's own
         run has come to rest."""
-        rest = [each.start for each in self._own.stages if each.name == STAGE_NAMES[REST]]
+        rest = [each.start for each in self._nominal.stages if each.name == STAGE_NAMES[REST]]
         start, steady = self.scene.supervisor.start, self.scene.steady_until or self.scene.run.time_limit
         return min(steady, start + _REST_TIMES * (rest[0] - start)) if rest else steady
 

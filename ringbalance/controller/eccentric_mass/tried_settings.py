@@ -34,12 +34,12 @@ _LONG: Final = 1.5
 """Ratio of the length of a stage to its shortest beyond which its gate is tried."""
 
 
-def trials_of(scene: EccentricScene, own: EccentricRun) -> Trials:
+def trials_of(scene: EccentricScene, nominal: EccentricRun) -> Trials:
     """Multiples of a scene's settings, of gates by its run as it is, and gains with margins where drives lack
     them."""
     loops, margins = RecommendedGains.of(scene).loops, advised(scene)
     largest = next(loop.recommended for loop in loops if loop.key == _WEIGHT)
-    tried = {**_FACTORS, **dict.fromkeys(_gates(scene, own), _GATE_FACTORS)}
+    tried = {**_FACTORS, **dict.fromkeys(_gates(scene, nominal), _GATE_FACTORS)}
     values = {path: value for path in tried if (value := value_at(scene, path)) > 0}
     axes = [
         SearchAxis(
@@ -63,9 +63,9 @@ def trials_of(scene: EccentricScene, own: EccentricRun) -> Trials:
     return Trials(kind=scene.balancer, axes=tuple(axes), settings=settings)
 
 
-def _gates(scene: EccentricScene, own: EccentricRun) -> Iterator[str]:
+def _gates(scene: EccentricScene, nominal: EccentricRun) -> Iterator[str]:
     least = {IMBALANCE: StrategySettings.of(scene).gates.least_estimate, FRICTION: LEAST_DRIVE_TIME_S}
-    lasted = {each.name: each.end - each.start for each in own.stages}
+    lasted = {each.name: each.end - each.start for each in nominal.stages}
     for stage, path in _GATES.items():
         if lasted.get(STAGE_NAMES[stage], 0.0) > _LONG * least[stage]:
             yield path

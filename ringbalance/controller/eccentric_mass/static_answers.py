@@ -1,4 +1,4 @@
-"""What a scene with eccentric masses answers without a run: reach, stall, run-up, holding and resolution.
+"""Answers without a run of a scene with eccentric masses: reach, stall, run-up, holding and resolution.
 
 W_0 is the speed at which balancing starts.  The run-up is taken as a sequence of steady states, with the load
 of its rate; a fast one passes a critical speed with less vibration.

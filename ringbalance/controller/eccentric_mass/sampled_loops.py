@@ -1,36 +1,33 @@
-"""Poles of the drives' sampled loops: voltages held over a step, on the masses with their drives.
+"""Poles and gain margins of the drives' sampled loops: voltages held over a step, on the masses with drives.
 
-Friction, the voltage limit and the rotor's whirl are neglected.  The rotor yields, which lowers a mass's
-inertia by b^2/M; the drive law compensates this.  A loop is stable when its poles lie within the unit
-circle.
+Friction, the voltage limit and the rotor's whirl are neglected.  The rotor yields, which lowers the inertia
+of the angle between opposite masses, where it yields most, to J (1 - 2 b^2/(M J)); the drive law compensates
+this once the imbalance is known.  A loop is stable when its poles lie within the unit circle.
 """
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ringbalance.controller.eccentric_mass.drive_law import lqr_gain, track_model
-from ringbalance.controller.eccentric_mass.plant import PlantParameters
+from ringbalance.controller.eccentric_mass.plant import Pair, PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.results.rows import Quantity
-from ringbalance.scene.arrays import ComplexArray
+from ringbalance.scene.arrays import ComplexArray, FloatArray
 
 GAIN_MARGIN: Final = 2.0
 """Factor by which the recommended gains could be higher before a pole leaves the unit circle."""
 _TORQUE_MARGIN: Final = 1.5
 """Ratio of the speed control's torque at standstill to the friction, at the recommended drive speed."""
-_SMALL_DECAY: Final = 1e-4
-_HALVINGS: Final = 50
 _SEARCH_FACTOR: Final = 1e9
-"""Largest factor by which the search for a limit departs from the scene's value, up or down."""
-_Poles = Callable[[float, float, float], ComplexArray]
-"""Function from the key's value, the hold, s, and a factor on the loop's gain to the poles."""
+"""Largest factor by which a limit departs from the scene's value, up or down."""
+_SMALL_DECAY, _ROUNDING = 1e-4, 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,55 +85,32 @@ class RecommendedGains:
     @classmethod
     def of(cls, scene: EccentricScene) -> RecommendedGains:
         """Judge the loops of a scene before it is run."""
-        plant, track, keys, lqr = (
-            PlantParameters.of(scene),
-            track_model(scene),
-            scene.friction_filter,
-            scene.lqr,
-        )
-
-        def regulator_poles(weight: float, hold: float, margin: float) -> ComplexArray:
-            position, rate = lqr_gain(track, state_weight=weight, input_weight=lqr.input_weight)
-            return _poles(scene, hold, margin * position, margin * rate)
-
-        def pair_poles(pair: float, speed: float, hold: float) -> ComplexArray:
-            # Both drives act on the angle between the masses.
-            return _poles(scene, hold, 2 * plant.drive_gain * pair, plant.drive_gain * speed, eased=True)
-
-        regulator = _loop(
+        plant, keys, lqr = PlantParameters.of(scene), scene.friction_filter, scene.lqr
+        volt, track = plant.drive_gain, track_model(scene)
+        regulator = _judged(
             scene,
-            name="regulator",
-            key="lqr.state_weight",
-            value=lqr.state_weight,
-            unit="",
-            poles=regulator_poles,
+            *("regulator", "lqr.state_weight", "", lqr.state_weight),
+            gain=lambda weight: lqr_gain(track, state_weight=weight, input_weight=lqr.input_weight),
+            eased=False,
         )
-        speed = _loop(
+        speed = _judged(
             scene,
-            name="speed control",
-            key="friction_filter.speed_gain",
-            value=keys.speed_gain,
-            unit="V*s/rad",
-            poles=lambda gain, hold, margin: _poles(
-                scene, hold, 0.0, plant.drive_gain * (margin * gain), eased=True
-            ),
+            *("speed control", "friction_filter.speed_gain", "V*s/rad", keys.speed_gain),
+            gain=lambda speed_gain: (0.0, volt * speed_gain),
         )
         slower = min(speed.value, speed.recommended)
-        pair = _loop(
+        pair = _judged(
             scene,
-            name="pair control",
-            key="friction_filter.pair_gain",
-            value=keys.pair_gain,
-            unit="V/rad",
-            poles=lambda gain, hold, margin: pair_poles(margin * gain, keys.speed_gain, hold),
-            # With the recommended speed gain, and with a margin on both gains.
-            value_poles=lambda gain, hold, margin: pair_poles(margin * gain, slower, hold),
-            hold_poles=lambda gain, hold, margin: pair_poles(margin * gain, margin * keys.speed_gain, hold),
+            *("pair control", "friction_filter.pair_gain", "V/rad", keys.pair_gain),
+            # Both drives act on the angle between the masses.
+            gain=lambda pair_gain: (2 * volt * pair_gain, 0.0),
+            beside=volt * keys.speed_gain,
+            recommended_beside=volt * slower,
             start=keys.pair_gain or slower,
         )
         # Speed w at which B_add gamma w equals the friction torque, times a margin.
         friction = max(plant.friction_arm) * plant.moment * scene.rotor.speed_profile[0].speed ** 2
-        drive_speed = max(keys.drive_speed, _TORQUE_MARGIN * friction / (plant.drive_gain * slower))
+        drive_speed = max(keys.drive_speed, _TORQUE_MARGIN * friction / (volt * slower))
         step = min(loop.recommended_step for loop in (regulator, speed, pair))
         return cls(regulator=regulator, speed=speed, pair=pair, step=step, drive_speed=drive_speed)
 
@@ -150,84 +124,89 @@ def advised(scene: EccentricScene) -> dict[str, float]:
     return changes
 
 
-def _loop(
+def _judged(
     scene: EccentricScene,
-    *,
     name: str,
     key: str,
-    value: float,
     unit: str,
-    poles: _Poles,
-    value_poles: _Poles | None = None,
-    hold_poles: _Poles | None = None,
+    value: float,
+    *,
+    gain: Callable[[float], Pair],
+    eased: bool = True,
+    beside: float = 0.0,
+    recommended_beside: float = 0.0,
     start: float | None = None,
 ) -> _SampledLoop:
-    """Judge a loop. Args: `value_poles`: poles that limit the value; `hold_poles`: the hold; default
-    `poles`."""
-    step, value_poles, hold_poles = scene.lqr.step, value_poles or poles, hold_poles or poles
+    """Judge a loop.
 
-    def hold_stable(hold: float) -> bool:
-        return _inside(hold_poles(value, hold, GAIN_MARGIN))
+    Args: `gain`: gains of angle, N m/rad, and rate, N m s/rad, by the value of the key. `eased`: True if the
+    drive law compensates the yielding of the rotor. `beside`: gain of the rate of another control, with which
+    the loop is judged; `recommended_beside`: with which a value is recommended. `start`: value from which a
+    recommended one is searched; default the scene's.
+    """
+    step, track = scene.lqr.step, track_model(scene)
+    yielding = 2 * track.moment**2 / (PlantParameters.of(scene).mass * track.inertia)
+    inertia, ratio = track.inertia * (1 - yielding), 1 - yielding if eased else 1.0
+    compensated = yielding * track.damping if eased else 0.0
+
+    def closed(hold: float, gains: Pair, *, order: int) -> FloatArray:
+        """Matrix of angle and rate, or of the rate alone, from one hold of the voltage to the next."""
+        decay = track.damping / inertia * hold
+        # Mean of the rate, and of its integral, that a hold of one unit of torque leaves.
+        first = -math.expm1(-decay) / decay if decay > 0 else 1.0
+        second = (1 - first) / decay if decay > _SMALL_DECAY else 0.5 - decay / 6
+        held = np.array([[1.0, hold * first], [0.0, math.exp(-decay)]])
+        entry, feedback = (hold * second, first), (ratio * gains[0], ratio * gains[1] - compensated)
+        return np.asarray((held - hold / inertia * np.outer(entry, feedback))[2 - order :, 2 - order :])
+
+    def margin(hold: float, gains: Pair, fixed: float) -> float:
+        order = 2 if gains[0] else 1
+        without = closed(hold, (0.0, fixed), order=order)
+        return _margin(without, closed(hold, (gains[0], gains[1] + fixed), order=order))
+
+    angle, rate = gain(value)
+    poles = np.linalg.eigvals(closed(step, (angle, rate + beside), order=2 if angle else 1))
+
+    def hold_margin(hold: float) -> float:
+        return margin(hold, (angle, rate + beside), 0.0)
 
     return _SampledLoop(
         name=name,
         key=key,
         value=value,
         unit=unit,
-        poles=poles(value, step, 1.0),
-        gain_margin=_largest(lambda factor: _inside(poles(value, step, factor)), 1.0),
-        recommended=_largest(lambda other: _inside(value_poles(other, step, GAIN_MARGIN)), start or value),
-        recommended_step=step if hold_stable(step) else _largest(hold_stable, step),
+        poles=poles[np.argsort(-np.abs(poles))].astype(np.complex128),
+        gain_margin=min(margin(step, (angle, rate), beside), _SEARCH_FACTOR),
+        recommended=_largest(lambda other: margin(step, gain(other), recommended_beside), start or value),
+        recommended_step=step if hold_margin(step) >= GAIN_MARGIN else _largest(hold_margin, step),
     )
 
 
-def _poles(
-    scene: EccentricScene, step: float, position: float, rate: float, *, eased: bool = False
-) -> ComplexArray:
-    """Poles, largest first, of the angle between opposite masses, where the rotor yields most.
+def _margin(without: FloatArray, closed: FloatArray) -> float:
+    """Largest factor on a gain with all poles in the unit circle, from the loop without it and with it.
 
-    Their inertia is J (1 - 2 b^2/(M J)). Args: `eased`: True if the drive law compensates the yielding of the
-    rotor; it does not while the imbalance is unknown.
+    Jury's conditions det(1 + A) > 0 and det A < 1 are linear in the factor; p(1) > 0 holds for any gain.
     """
-    track, mass = track_model(scene), PlantParameters.of(scene).mass
-    given_way = 2 * track.moment**2 / (mass * track.inertia)
-    if eased:
-        position, rate = (1 - given_way) * position, (1 - given_way) * rate - given_way * track.damping
-    decay = track.damping / (track.inertia * (1 - given_way)) * step
-    remaining = math.exp(-decay)
-    # Mean of the rate, and of its integral, that a step of one unit of torque leaves.
-    first = -math.expm1(-decay) / decay if decay > 0 else 1.0
-    second = (1 - first) / decay if decay > _SMALL_DECAY else 0.5 - decay / 6
-    per_torque = step / (track.inertia * (1 - given_way))
-    if position == 0:
-        return np.array([remaining - per_torque * first * rate], dtype=np.complex128)
-    trace = 1 - per_torque * step * second * position + remaining - per_torque * first * rate
-    product = (1 - per_torque * step * second * position) * (remaining - per_torque * first * rate)
-    product += per_torque * first * position * step * (first - per_torque * second * rate)
-    root = cmath.sqrt(0.25 * trace**2 - product)
-    far = 0.5 * trace + (root if trace * root.real >= 0 else -root)
-    return np.array([far, product / far if far != 0 else 0.0j], dtype=np.complex128)
+    unit = np.eye(len(closed))
+    pairs = [
+        (float(np.linalg.det(unit + without)), float(np.linalg.det(unit + closed))),
+        (1.0 - float(np.linalg.det(without)), 1.0 - float(np.linalg.det(closed))),
+    ]
+    if min(before for before, _ in pairs) < -_ROUNDING:
+        return 0.0
+    return min((max(a, 0.0) / (a - b) for a, b in pairs if b < a - _ROUNDING), default=math.inf)
 
 
-def _inside(poles: ComplexArray) -> bool:
-    """Return True if all poles lie within the unit circle."""
-    return bool(np.max(np.abs(poles)) < 1)
+def _largest(margin: Callable[[float], float], start: float) -> float:
+    """Largest value with the required margin, which falls with the value."""
 
+    def excess(decades: float) -> float:
+        return math.log(min(max(margin(start * 10**decades), 1e-12), 1e12) / GAIN_MARGIN)
 
-def _largest(stable: Callable[[float], bool], start: float) -> float:
-    """Largest stable value, provided that all smaller ones are stable.
-
-    Doubled or halved from `start` until the limit is bracketed, then bisected.  Values far below the limit
-    are avoided: there a slow pole rounds to one and would count as unstable.
-    """
-    low, factor = start, 2.0 if stable(start) else 0.5
-    while start / _SEARCH_FACTOR < low < start * _SEARCH_FACTOR and stable(factor * low) == (factor > 1):
-        low *= factor
-    low, high = (low, 2 * low) if factor > 1 else (0.5 * low, low)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if stable(middle) else (low, middle)
-    return low
+    far = math.log10(_SEARCH_FACTOR)
+    if excess(far) >= 0 or excess(-far) <= 0:
+        return start * (_SEARCH_FACTOR if excess(far) >= 0 else 1 / _SEARCH_FACTOR)
+    return float(start * 10 ** brentq(excess, -far, far, xtol=1e-13))
 
 
 def loops_status(gains: RecommendedGains) -> str:

@@ -105,6 +105,22 @@ def test_recommended_gains_leave_their_margin(scene: EccentricScene) -> None:
     assert all(loop.stable for loop in RecommendedGains.of(shorter).loops)
 
 
+@pytest.mark.parametrize("hold", [1.0, 30.0])
+def test_at_its_margin_a_loop_has_a_pole_on_the_unit_circle(scene: EccentricScene, hold: float) -> None:
+    """Jury's conditions against eigenvalues; the margin is zero beside another loop that is unstable."""
+    longer = changed(scene, {"lqr.step": hold * scene.lqr.step})
+    for name, key in (("speed", "speed_gain"), ("pair", "pair_gain")):
+        gains = RecommendedGains.of(longer)
+        loop = getattr(gains, name)
+        if loop.gain_margin == 0:
+            assert name == "pair"
+            assert not gains.speed.stable
+            continue
+        for factor, stable in ((1 - 1e-7, True), (1 + 1e-7, False)):
+            gain = {f"friction_filter.{key}": factor * loop.gain_margin * loop.value}
+            assert getattr(RecommendedGains.of(changed(longer, gain)), name).stable == stable
+
+
 def test_the_drive_speed_overcomes_friction_and_a_free_mass_needs_none(scene: EccentricScene) -> None:
     gains, plant = RecommendedGains.of(scene), PlantParameters.of(scene)
     gain = min(scene.friction_filter.speed_gain, gains.speed.recommended)

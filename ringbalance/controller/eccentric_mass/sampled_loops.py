@@ -104,8 +104,8 @@ class RecommendedGains:
             *("pair control", "friction_filter.pair_gain", "V/rad", keys.pair_gain),
             # Both drives act on the angle between the masses.
             gain=lambda pair_gain: (2 * volt * pair_gain, 0.0),
-            beside=volt * keys.speed_gain,
-            recommended_beside=volt * slower,
+            other_rate=volt * keys.speed_gain,
+            recommended_rate=volt * slower,
             start=keys.pair_gain or slower,
         )
         # Speed w at which B_add gamma w equals the friction torque, times a margin.
@@ -133,15 +133,15 @@ def _judged(
     *,
     gain: Callable[[float], Pair],
     eased: bool = True,
-    beside: float = 0.0,
-    recommended_beside: float = 0.0,
+    other_rate: float = 0.0,
+    recommended_rate: float = 0.0,
     start: float | None = None,
 ) -> _SampledLoop:
     """Judge a loop.
 
     Args: `gain`: gains of angle, N m/rad, and rate, N m s/rad, by the value of the key. `eased`: True if the
-    drive law compensates the yielding of the rotor. `beside`: gain of the rate of another control, with which
-    the loop is judged; `recommended_beside`: with which a value is recommended. `start`: value from which a
+    drive law compensates the yielding of the rotor. `other_rate`: gain of the rate of another control, with which
+    the loop is judged; `recommended_rate`: with which a value is recommended. `start`: value from which a
     recommended one is searched; default the scene's.
     """
     step, track = scene.lqr.step, track_model(scene)
@@ -165,10 +165,10 @@ def _judged(
         return _margin(without, closed(hold, (gains[0], gains[1] + fixed), order=order))
 
     angle, rate = gain(value)
-    poles = np.linalg.eigvals(closed(step, (angle, rate + beside), order=2 if angle else 1))
+    poles = np.linalg.eigvals(closed(step, (angle, rate + other_rate), order=2 if angle else 1))
 
     def hold_margin(hold: float) -> float:
-        return margin(hold, (angle, rate + beside), 0.0)
+        return margin(hold, (angle, rate + other_rate), 0.0)
 
     return _SampledLoop(
         name=name,
@@ -176,8 +176,8 @@ def _judged(
         value=value,
         unit=unit,
         poles=poles[np.argsort(-np.abs(poles))].astype(np.complex128),
-        gain_margin=min(margin(step, (angle, rate), beside), _SEARCH_FACTOR),
-        recommended=_largest(lambda other: margin(step, gain(other), recommended_beside), start or value),
+        gain_margin=min(margin(step, (angle, rate), other_rate), _SEARCH_FACTOR),
+        recommended=_largest(lambda other: margin(step, gain(other), recommended_rate), start or value),
         recommended_step=step if hold_margin(step) >= GAIN_MARGIN else _largest(hold_margin, step),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any, Final
 
@@ -21,6 +22,10 @@ from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import shortest, shortest_quantity
 
 _MAX_CURVE_POINTS: Final = 50
+_LIMIT: Final = "controller.limit"
+_LIMIT_DIGITS: Final = 3
+_ROUNDING: Final = 1e-9
+"""Relative rounding error of a number that has no more digits than are kept."""
 
 
 def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
@@ -110,7 +115,10 @@ def advice_view(record: Record) -> Record:
 
 
 def settings_lines(scene: SceneFile, paths: Iterable[str]) -> list[Record]:
-    """Values of a scene as lines of its file, by table, without those that it leaves out."""
+    """Values of a scene as lines of its file, by table, without those that it leaves out.
+
+    A limit, which may follow from a balance quality grade, is rounded down to three digits.
+    """
 
     def written(value: Any, path: str) -> Any:
         if isinstance(value, tuple):
@@ -118,6 +126,9 @@ def settings_lines(scene: SceneFile, paths: Iterable[str]) -> list[Record]:
             return written(value[0], path) if len(value) == 1 else [written(each, path) for each in value]
         if isinstance(value, str | bool | int):
             return value
+        if path == _LIMIT and value > 0:
+            digit = 10.0 ** (math.floor(math.log10(value)) - _LIMIT_DIGITS + 1)
+            value = digit * math.floor(value / digit * (1 + _ROUNDING))
         unit = usual_unit(path)
         return shortest_quantity(value, unit) if unit not in ("", "1") else float(shortest(value))
 

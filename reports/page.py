@@ -78,7 +78,7 @@ _WEBP: Final[Record] = {"format": "WEBP", "quality": 70, "method": 6}
 
 
 def _scene_groups(rows: list[Record]) -> list[tuple[str, list[Record]]]:
-    """Rows of the scene by group; defaults of the program with no more digits than are certain."""
+    """Rows of values by group; defaults of the program with no more digits than are certain."""
     shown = []
     for row in rows:
         text: str = row["value"]
@@ -89,6 +89,10 @@ def _scene_groups(rows: list[Record]) -> list[tuple[str, list[Record]]]:
             text = digits + text[value.end() :]
         shown.append({**row, "value": text})
     return [(name, list(group)) for name, group in groupby(shown, key=lambda row: row["group"])]
+
+
+def _is_plain(row: Record) -> bool:
+    return row["origin"] == "default" and not row["uncertainty"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,7 +145,11 @@ def page_content(
             ("ringbalance", program),
         ),
         "running_head": f"{scene['name']}, scene {scene['sha256'][:12]}, {date}",
-        "scene_groups": _scene_groups(scene["table"]),
+        # Defaults without an uncertainty are listed in the annex.
+        "scene_groups": {
+            document: _scene_groups([row for row in scene["table"] if _is_plain(row) is in_annex])
+            for document, in_annex in (("report", False), ("annex", True))
+        },
         "product": f"ringbalance {program}",
         "sections": sections,
         "claims": [cases[case["id"]] for case in claims],

@@ -115,7 +115,7 @@ def run_amplitude(run: Record) -> Drawing:
         y=AMPLITUDE,
         columns=3,
         wide=True,
-        height=3.2,
+        height=2.5,
     )
 
 
@@ -158,7 +158,7 @@ def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
     sampled = run.get("samples", {"time_s": []})["time_s"][:_NUMBERED_SAMPLES]
 
     def paint(axes: Axes) -> None:
-        boxes = ((0.04, 0.05, 0.4, 0.8), (0.56, 0.05, 0.4, 0.8))
+        boxes = ((0.04, 0.09, 0.4, 0.7), (0.56, 0.09, 0.4, 0.7))
         far, near = panels(axes, *boxes, projection="polar")
         for panel, span, title in ((far, radius, "whole run"), (near, 4 * limit, "near the limit")):
             panel.plot(np.linspace(0, math.tau, 120), np.full(120, limit), color=PAPER)
@@ -188,11 +188,11 @@ def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
             text = f"unbalance, lag {plain_number(round(math.degrees(lag), 1))}°"
             side = "right" if math.cos(heavy) > 0 else "left"
             ground = {"facecolor": SURFACE, "edgecolor": "none", "pad": 1}
-            note(text, (heavy, 0.85 * radius), (0, 3), ha=side, va="bottom", bbox=ground)(far)
+            note(text, (heavy, 0.6 * radius), (0, 3), ha=side, va="bottom", bbox=ground)(far)
             closed = np.append(ends, ends[0])
             far.plot(np.angle(closed), np.abs(closed), color=THIRD, linestyle=(0, (5, 2)))
 
-    return draw("residual-polar", paint, columns=0, wide=True, height=3.9)
+    return draw("residual-polar", paint, columns=0, wide=True, height=3.2)
 
 
 def _reachable(length: float, direction: float, pairs: int) -> Any:

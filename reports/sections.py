@@ -25,7 +25,7 @@ from ringbalance.reports.pages import (
     tube,
     tube_flow,
 )
-from ringbalance.reports.pages.standing import CASES, CONDITIONS, CREDIBILITY, DOCUMENT
+from ringbalance.reports.pages.standing import CASES, CONDITIONS, CREDIBILITY, DEFAULTS, DOCUMENT, PARAMETERS
 from ringbalance.reports.section import Document, Record, Section
 
 SECTIONS: Final[tuple[Section, ...]] = (
@@ -35,7 +35,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     loop.LOOP,
     Section(name="claims", title="Claims of the liquid-ring paper", document="report", of_paper=True),
     CREDIBILITY,
-    Section(name="parameters", title="Parameters and their origin", document="report"),
+    PARAMETERS,
     DOCUMENT,
     chamber.DISC,
     chamber.PRESSURE,
@@ -54,6 +54,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     cases.TRADE,
     Section(name="models", title="Models used, and why"),
     measured.SECTION,
+    DEFAULTS,
     Section(name="scene", title="Scene file, mesh and versions"),
 )
 _BY_BALANCER: Final[Mapping[str, tuple[Section, ...]]] = MappingProxyType(

@@ -139,7 +139,7 @@ def _in_brief(quantity: JudgedQuantity) -> str:
     display = display_unit(unit, value, width)
     shown_value, shown_width = value * display.factor, width * display.factor
     digits = math.floor(math.log10(abs(shown_value))) - last_place(shown_width) + 1
-    text = number(shown_value, digits=digits)
+    text = number(shown_value, digits=min(digits, _MAX_DIGITS))
     return marked(with_unit(text, display.symbol), value)
 
 

@@ -21,7 +21,7 @@ from ringbalance.reports.mass_figures import (
 )
 from ringbalance.reports.pages import measured
 from ringbalance.reports.pages.plain import decision, decision_view
-from ringbalance.reports.pages.standing import CASES, CREDIBILITY, DOCUMENT
+from ringbalance.reports.pages.standing import CASES, CREDIBILITY, DEFAULTS, DOCUMENT, PARAMETERS
 from ringbalance.reports.section import Record, Section
 
 _MAGNIFIED_HALF: Final = 0.75
@@ -142,9 +142,10 @@ SECTIONS: Final = (
         template="masses_claims.html",
     ),
     CREDIBILITY,
-    Section(name="parameters", title="Parameters and their origin", document="report"),
+    PARAMETERS,
     DOCUMENT,
     CASES,
     measured.SECTION,
+    DEFAULTS,
     Section(name="scene", title="Scene file"),
 )

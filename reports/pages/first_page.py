@@ -194,6 +194,7 @@ def _view(record: Record, evidence: Record) -> Record:
         "question": {name: verdicts[name] for name in _QUESTION} if answered else {},
         "rests_on": {code: resting(evidence, *paths) for code, paths in _RESTS.items()},
         "pressure": _pressure_figure(record),
+        **_over_pressure(record),
         "values_file": READING_FILE,
         **advice_view(record),
         "in_place": advice_view({"remedies": [record["in_place"]]})["remedies"][0]
@@ -206,6 +207,27 @@ def _view(record: Record, evidence: Record) -> Record:
         # An error of a model in the words of what it acts on.
         "acts_on": {f"{MODEL}{name}": kind.acts_on for name, kind in MODEL_KINDS.items()},
         "borrowed": [path for path in _ROTOR if "default" in (rows.get(path), origins.get(path))],
+    }
+
+
+def _over_pressure(record: Record) -> Record:
+    """Gas pressures with a verdict, Pa, and the most frequent end of other devices below and above the
+    recommended one."""
+    levels = (record.get("along") or {"levels": ()})["levels"]
+    spans = {
+        verdict: [min(values), max(values)]
+        for verdict in (MET, OPEN)
+        if (values := [level["value"] for level in levels if level["verdict"] == verdict])
+    }
+    chosen, ends = record["recommended_pressure_Pa"], {"below": Counter[str](), "above": Counter[str]()}
+    for level in levels:
+        if level["value"] != chosen:
+            ends["below" if level["value"] < chosen else "above"] += Counter(level.get("ended"))
+    for counts in ends.values():
+        counts.pop("settled", None)
+    return {
+        "spans": spans,
+        "causes": {side: next(iter(counts.most_common(1)), ("",))[0] for side, counts in ends.items()},
     }
 
 
@@ -226,7 +248,7 @@ def _pressure_figure(record: Record) -> Drawing | None:
     times = {key: [level["settling_time_s"][key] for level in levels] for key in ("p50", "p90")}
 
     def paint(axes: Axes) -> None:
-        boxes = (0.12, 0.64, 0.85, 0.2), (0.12, 0.385, 0.85, 0.17), (0.12, 0.12, 0.85, 0.17)
+        boxes = (0.12, 0.63, 0.85, 0.18), (0.12, 0.385, 0.85, 0.16), (0.12, 0.14, 0.85, 0.16)
         titles = (
             "devices that settle, in %",
             "moment that can be corrected, in g mm",
@@ -265,7 +287,7 @@ def _pressure_figure(record: Record) -> Drawing | None:
         legend: Record = {"loc": "upper left", "ncols": 3, "borderaxespad": 0.0, "borderpad": 0.1}
         figure_of(axes).legend([*handles, *patches], [*labels, *grounds], columnspacing=1.0, **legend)
 
-    return draw("pressure-choice", paint, columns=0, height=3.5)
+    return draw("pressure-choice", paint, columns=0, height=2.95)
 
 
 def pressure_page(evidence: Record, drawing: Drawing) -> str:

@@ -121,7 +121,7 @@ def _amplitude(runs: dict[str, Record], limit: float) -> Drawing:
         for look in (*(_LAWS[law] for law in runs), {"color": MUTED, "linestyle": ":", "label": "limit"}):
             axes.plot([], [], **look)
 
-    return draw("amplitude", paint, columns=3, wide=True, height=3.6)
+    return draw("amplitude", paint, columns=3, wide=True, height=2.9)
 
 
 def _together(injections: Sequence[Record]) -> list[tuple[float, float, list[str]]]:
@@ -195,7 +195,7 @@ def settling(curves: Sequence[tuple[dict[str, Any], Record]], required_fraction:
         axes.yaxis.set_major_formatter(PercentFormatter(1, symbol=""))
 
     look: Record = {"x": TIME, "y": ("settled devices in %", "1"), "xlim": (0, None), "ylim": (0, 1.05)}
-    return draw("settling", paint, columns=3, wide=True, **look)
+    return draw("settling", paint, columns=3, wide=True, height=2.1, **look)
 
 
 LOOP: Final = Section(

@@ -68,7 +68,7 @@ _NAME_CLEARANCE_POINTS: Final = 2.2
 _WORKING_RANGE_CLEARANCE: Final = 0.035
 """Least distance of regimes' names from the working range, over the map's height."""
 _MM_PER_M: Final = 1e3
-_HEIGHT_IN: Final = 4.1
+_HEIGHT_IN: Final = 3.3
 _PICTURE_HALF: Final = 1.42
 """Half the height of the picture over the outer radius: room for the dimensions."""
 _CENTRE_LINE_DASHES: Final = (0, (6, 2, 1, 2))
@@ -176,6 +176,7 @@ def _operating_map(record: Record) -> Drawing:
             row, column = np.unravel_index(np.argmax(room), room.shape)
             if room[row, column] >= _NAME_CLEARANCE_POINTS:
                 look: dict[str, Any] = {"ha": "center", "va": "center", "color": INK, "weight": "bold"}
+                look["bbox"] = {"facecolor": SURFACE, "alpha": 0.75, "linewidth": 0, "pad": 1.5}
                 axes.text(fill[column], pressure[row], name, **look)
         axes.grid(visible=False)
 
@@ -199,7 +200,7 @@ def _operating_map(record: Record) -> Drawing:
         ylim=(pressure[0], pressure[-1]),
         columns=3,
         wide=True,
-        height=3.6,
+        height=2.6,
     )
 
 

@@ -11,7 +11,7 @@ from ringbalance.controller.judging.ranking import ranked
 from ringbalance.controller.judging.remedies import tried_remedies
 from ringbalance.controller.judging.search import searched
 from ringbalance.reports.judged import advice_view, judgement_record, settings_lines
-from ringbalance.reports.pages.standing import DOCUMENT
+from ringbalance.reports.pages.standing import DEFAULTS, DOCUMENT, PARAMETERS
 from ringbalance.reports.run_figures import run_amplitude
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.results.requirements import MET
@@ -70,7 +70,8 @@ SECTIONS: Final = (
         show=_summary,
         template="plain_summary.html",
     ),
-    Section(name="parameters", title="Parameters and their origin", document="report"),
+    PARAMETERS,
     DOCUMENT,
+    DEFAULTS,
     Section(name="scene", title="Scene file"),
 )

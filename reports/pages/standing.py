@@ -166,3 +166,5 @@ def _document(_own: Record, evidence: Record) -> Record:
 DOCUMENT: Final = Section(
     name="document", title="Document data, symbols and sources", document="report", show=_document
 )
+PARAMETERS: Final = Section(name="parameters", title="Parameters and their origin", document="report")
+DEFAULTS: Final = Section(name="defaults", title="Defaults of the program", template="parameters.html")

@@ -249,6 +249,8 @@ class Remedy:
     """Name of a part that can be bought; else empty."""
     continuous: bool = False
     """True if values between this and another of its kind are possible as well."""
+    assumed: tuple[str, ...] = ()
+    """Paths of the changes that neither the scene nor a data sheet states: the program assumes them."""
 
 
 class Balancer(ABC):

@@ -67,6 +67,17 @@ def test_without_a_file_the_same_three_valves_as_ever_are_tried() -> None:
     ]
 
 
+def test_only_a_lag_of_the_programs_own_counts_as_assumed(file: Path) -> None:
+    """Neither that of a file of valves nor that of the scene."""
+    scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+    assert isinstance(scene, Scene)
+    assert {each.assumed for each in valves_of(scene)} == {("gas.valve_lag",)}
+    for stated in (with_valves(scene, file), scene.with_values({"gas.valve_lag": "15 ms"})):
+        assert isinstance(stated, Scene)
+        assert {each.assumed for each in valves_of(stated)} == {()}
+        assert len(valves_of(stated)) >= 3
+
+
 def test_the_commands_that_try_valves_take_a_file() -> None:
     assert [name for name, each in COMMANDS.items() if "valves" in each.options] == [
         "report",

@@ -43,7 +43,7 @@ def test_symbols_are_those_of_the_glossary() -> None:
 @pytest.mark.usefixtures("unwritten")
 def test_the_document_names_what_it_was_made_of(evidence: Record) -> None:
     shown = facts(evidence)
-    assert shown["Commit"] == "0123456789abcdef"
+    assert shown["Commit"] == "0123456789ab"
     assert shown["Command"] == "ringbalance report sample.toml"
     assert hashlib.sha256(evidence_text(evidence).encode()).hexdigest() in shown["evidence.json"]
     assert json.loads(evidence_text(evidence)) == evidence

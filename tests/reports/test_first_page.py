@@ -9,7 +9,7 @@ import pytest
 
 from ringbalance.reports.judged import settings_lines
 from ringbalance.reports.page import terminal_lines
-from ringbalance.reports.pages.first_page import SECTION, SETTINGS, _requirement_record
+from ringbalance.reports.pages.first_page import SECTION, SETTINGS, _over_pressure, _requirement_record
 from ringbalance.reports.prose import opening
 from ringbalance.scene import Scene
 from ringbalance.scene.toml import read_toml
@@ -114,6 +114,50 @@ def test_the_residual_s_grade_follows_from_the_mass(paper_scene: Scene) -> None:
     assert record["grade_at_residual_m_s"] == pytest.approx(0.05 / 0.0108 * 1e-6 * 1047.2 / 10, rel=1e-4)
 
 
+def valve_choice(**changed: Any) -> Record:
+    fraction = {"value": 1.0, "low": 0.94, "high": 1.0, "count": 64, "of": 64}
+    changes = {"gas.conductance": 2.3e-8, "gas.critical_ratio": 0.36, "gas.valve_lag": 0.02}
+    times = {"half_settle_s": 5.8, "ninety_percent_settle_s": 11.0}
+    choice = {"name": "Valve A", "changes": changes, "settings": {}, "fraction": fraction, "verdict": "met"}
+    return {**choice, **times, "assumed": "valve lag of 20 ms", **changed}
+
+
+def test_a_verdict_that_rests_on_an_assumed_lag_says_so(evidence: Record, said: Said) -> None:
+    assumed, stated = valve_choice(), valve_choice(assumed="")
+    condition = "Valve A, if it has the valve lag of 20 ms that this program assumes, "
+    for choice, says in ((assumed, True), (stated, False)):
+        evidence["summary"].update(choices=[choice], best_choice=choice, valve_given=False)
+        text = said(evidence, "summary")
+        assert ("With " + condition + "64 of 64" in text) is says
+        assert ("With Valve A, 64 of 64" in text) is not says
+        assert ("Ask the seller for its lag, which is assumed" in text) is says
+        assert ("no data sheet prints the lags" in text) is says
+        assert ("With " + condition + "100 %" in terminal_lines(evidence)[0]) is says
+        assert "Valve A | 2.3 l/(s bar) | 20 ms" in text
+
+
+def test_pressures_and_the_ends_of_other_devices_are_in_words() -> None:
+    levels = [
+        {"value": 3e5, "verdict": "not met", "ended": {"stalled": 60, "settled": 4}},
+        {"value": 4e5, "verdict": "undecided", "ended": {"settled": 58, "hovering": 6}},
+        {"value": 5e5, "verdict": "met", "ended": {"settled": 63, "diverging": 1}},
+        {"value": 6e5, "verdict": "met", "ended": {"settled": 64}},
+        {"value": 7e5, "verdict": "undecided", "ended": {"settled": 57, "capacity_exceeded": 7}},
+    ]
+    view = _over_pressure({"along": {"levels": levels}, "recommended_pressure_Pa": 5e5})
+    assert view["spans"] == {"met": [5e5, 6e5], "undecided": [4e5, 7e5]}
+    assert view["causes"] == {"below": "stalled", "above": "capacity_exceeded"}
+
+
+@pytest.mark.parametrize(
+    ("limit", "line"),
+    [("0.1145916 um", "0.114 um"), ("0.05 um", "0.05 um"), ("0.29 um", "0.29 um"), ("1.999 um", "1.99 um")],
+)
+def test_a_limit_is_rounded_down(paper_scene: Scene, limit: str, line: str) -> None:
+    (table,) = settings_lines(paper_scene.with_values({"controller.limit": limit}), ["controller.limit"])
+    assert table["lines"] == [f'limit = "{line}"']
+
+
 def test_the_inputs_that_decide_most_come_first(evidence: Record, said: Said) -> None:
     rows = [("tube.bore", 0.3, False), ("", 0.2, True), ("rotor.lag_angle", 0.02, False)]
     evidence["summary"]["ranking"] = [
@@ -130,7 +174,7 @@ def test_the_inputs_that_decide_most_come_first(evidence: Record, said: Said) ->
     text = said(evidence, "summary")
     first = "Bore of the tube (assumed): 30 %, varies between devices"
     second = "Error of the model, loss: 20 %, not known, but common to all devices"
-    assert f"settling time. {first}. {second}." in text
+    assert f"settling time. {first}; {second}; the rest" in text
 
 
 def test_the_bore_and_the_other_reading_are_named(evidence: Record, said: Said) -> None:
@@ -141,9 +185,9 @@ def test_the_bore_and_the_other_reading_are_named(evidence: Record, said: Said) 
         "fraction": {"value": 0.98},
     }
     text = said(evidence, "summary")
-    assert "assumes 1.5 mm" in text
+    assert "Bore 1.5 mm, by Fig. 7" in text
     assert "0.896 mm" in text
-    assert "98 % of the devices settle" in text
+    assert "98 % of devices settle there" in text
     evidence["summary"].update(other_reading=None, bore_uncertainty_stated=True)
     assert "on which k and every velocity rest" not in said(evidence, "summary")
 
@@ -151,7 +195,7 @@ def test_the_bore_and_the_other_reading_are_named(evidence: Record, said: Said) 
 def test_what_the_scene_leaves_to_the_paper_s_rotor_is_named(evidence: Record, said: Said) -> None:
     assert "so those of the paper’s rotor" not in said(evidence, "summary")
     evidence["scene"]["origins"]["rotor.influence_coefficient"] = "default"
-    named = "Missing in the scene and taken from the paper’s rotor: influence coefficient."
+    named = "Taken from the paper’s rotor: influence coefficient; unbalance"
     assert named in said(evidence, "summary")
 
 
@@ -163,11 +207,11 @@ def test_what_is_met_without_uncertainties_is_met_if_the_parts_are_exact(
             each["verdict"] = "met"
     stated = said(evidence, "summary")
     assert "if the parts are exact" not in stated
-    assert "states no uncertainty" not in stated
+    assert "Parts are exact" not in stated
     evidence["scene"]["states_uncertainty"] = False
     unstated = said(evidence, "summary")
     assert "The verdict holds if the parts are exact" in unstated
-    assert "states no uncertainty" in unstated
+    assert "Parts are exact: the scene states no [uncertainty]" in unstated
 
 
 def test_page_one_answers_the_papers_question_by_the_library_too(evidence: Record, said: Said) -> None:

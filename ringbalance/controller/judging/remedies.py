@@ -23,7 +23,9 @@ from ringbalance.controller.judging.judge import (
     plain_settings,
 )
 from ringbalance.results.requirements import MET, MISSED
+from ringbalance.results.rows import series
 from ringbalance.scene.changes import rechecked
+from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import value_at
 
@@ -73,6 +75,13 @@ class Remedied:
         return {path: value for path, value in self.judgement.settings.items() if path not in changes}
 
     @property
+    def assumed(self) -> str:
+        """Changes whose values the program assumes, in words: "valve lag of 20 ms"; else empty."""
+        paths = [path for remedy in self.remedies for path in remedy.assumed]
+        words = (f"{path.split('.')[1]} of {setting_text(path, self.changes[path])}" for path in paths)
+        return series([each.replace("_", " ") for each in words])
+
+    @property
     def met(self) -> bool:
         """True if the verdict is `MET`."""
         return self.judgement.verdict == MET
@@ -90,6 +99,7 @@ class Remedied:
             "code": self.code,
             "name": self.remedies[0].name,
             "changes": dict(self.changes),
+            "assumed": self.assumed,
             "settings": plain_settings(self.settings),
             "fraction": self.judgement.fraction.document(),
             "verdict": self.judgement.verdict,

@@ -34,9 +34,7 @@ _VERDICT_CODES: Final = {MET: "tuned_met", MISSED: "tuned_missed", OPEN: "tuned_
 _PART_CODES: Final = {MET: "part_met", MISSED: "part_missed", OPEN: "part_open"}
 _EXACT: Final = "_exact"
 """Suffix of the code of a met verdict where the scene states no uncertainty."""
-_CHOICES_CAPTION: Final = (
-    "Valves that can be bought, their lags assumed, each with the best settings of a coarse grid"
-)
+_CHOICES_CAPTION: Final = "Valves that can be bought, each with the best settings of a coarse grid"
 
 
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
@@ -266,6 +264,8 @@ class Tuning(Result):
         if part := self.best_choice:
             values = {**part.judgement.sentence_values, "name": part.remedies[0].name}
             values["parts"] = len(self.choices)
+            assumed = part.assumed
+            values["if"] = f" if it has the {assumed} that the program assumes" if assumed else ""
             yield Finding(code=_PART_CODES[part.judgement.verdict], values=values, change=part.changes)
         code = _VERDICT_CODES[best.verdict] + if_exact(self.given, best)
         values = {**best.sentence_values, "part": " and an ideal valve" if self.open_choice else ""}

@@ -208,6 +208,7 @@ def valves_of(scene: Scene) -> tuple[Remedy, ...]:
 def valve_choices(scene: Scene, *, lag: float | None = None) -> tuple[Remedy, ...]:
     """Valves at hand, or some that can be bought. Args: `lag`: in place of their own, s; None: their own."""
     remedies = []
+    assumed = ("gas.valve_lag",) if lag is None and not scene.design.valves else ()
     for valve in (each.completed for each in scene.design.valves or valves_on_sale()):
         conductance, ratio = valve.iso_6358
         changes = {
@@ -215,7 +216,7 @@ def valve_choices(scene: Scene, *, lag: float | None = None) -> tuple[Remedy, ..
             "gas.critical_ratio": ratio,
             "gas.valve_lag": valve.valve_lag if lag is None else lag,
         }
-        remedies.append(Remedy(code="valve", name=valve.name, changes=changes))
+        remedies.append(Remedy(code="valve", name=valve.name, changes=changes, assumed=assumed))
     return tuple(remedies)
 
 

@@ -192,3 +192,14 @@ def test_the_verdict_is_that_of_the_best_part_on_sale_and_not_that_of_an_ideal_o
     met = replace(result, choices=(missed, replace(missed, judgement=paper.recommended)))
     assert met.succeeded
     assert met.to_dict()["settings"]["gas.conductance"] == 1e-9
+
+
+def test_a_verdict_that_rests_on_a_lag_that_the_program_assumes_says_so(paper: Tuning) -> None:
+    valve = Remedy(code="valve", name="Fast", changes={"gas.conductance": 1e-8, "gas.valve_lag": 0.02})
+    for assumed, says in (
+        (("gas.valve_lag",), " if it has the valve lag of 20 ms that the program assumes"),
+        ((), ""),
+    ):
+        part = Remedied(remedies=(replace(valve, assumed=assumed),), judgement=paper.recommended, size=1.0)
+        assert replace(paper, choices=(part,)).status.startswith(f"met with Fast{says}: with this valve ")
+        assert part.document()["assumed"] == ("valve lag of 20 ms" if assumed else "")

@@ -140,9 +140,9 @@ def _judged(
     """Judge a loop.
 
     Args: `gain`: gains of angle, N m/rad, and rate, N m s/rad, by the value of the key. `eased`: True if the
-    drive law compensates the yielding of the rotor. `other_rate`: gain of the rate of another control, with which
-    the loop is judged; `recommended_rate`: with which a value is recommended. `start`: value from which a
-    recommended one is searched; default the scene's.
+    drive law compensates the yielding of the rotor. `other_rate`: gain of the rate of another control in the
+    loop as judged; `recommended_rate`: in that of a recommended value. `start`: value from which this is
+    searched; default the scene's.
     """
     step, track = scene.lqr.step, track_model(scene)
     yielding = 2 * track.moment**2 / (PlantParameters.of(scene).mass * track.inertia)

@@ -296,7 +296,8 @@ def correct(constants: FilterConstants, estimate: Record, sample: Numbers, varia
     With a true model that square has a chi-square distribution with four degrees of freedom, independent of
     earlier samples.
 
-    Joseph's form P+ = (I - k h) P (I - k h)^T + r k k^T stays symmetric and positive despite round-off.
+    Joseph's form P+ = (I - k h) P (I - k h)^T + r k k^T, with P h^T as `cross`, stays symmetric and positive
+    despite round-off.
     Args: `sample`, `variance`: x, y, x', y', and the noise variance of each.
     Source: Eqs. 16 to 21 of the paper on eccentric masses; Bucy and Joseph, "Filtering for Stochastic
     Processes with Applications to Guidance" (1968).
@@ -315,23 +316,17 @@ def correct(constants: FilterConstants, estimate: Record, sample: Numbers, varia
             surprise += innovation * innovation / total
             for i in range(6):
                 state[i] += cross[i] / total * innovation
-            _joseph(p, total, h, cross, r)
+            for i in range(6):
+                seen, gain = 0.0, cross[i] / total
+                for k in range(6):
+                    p[i, k] -= gain * cross[k]
+                    seen += p[i, k] * h[k]
+                for k in range(6):
+                    p[i, k] += (r * gain - seen) * cross[k] / total
+            for i in range(6):
+                for k in range(i):
+                    p[i, k] = p[k, i] = 0.5 * (p[i, k] + p[k, i])
     return surprise
-
-
-@in_place
-def _joseph(p: FloatArray, total: float, h: FloatArray, cross: FloatArray, r: float) -> None:
-    """P <- (I - k h) P (I - k h)^T + r k k^T in place; `cross` is P h^T, k = `cross`/`total`."""
-    for i in range(6):
-        seen, gain = 0.0, cross[i] / total
-        for k in range(6):
-            p[i, k] -= gain * cross[k]
-            seen += p[i, k] * h[k]
-        for k in range(6):
-            p[i, k] += (r * gain - seen) * cross[k] / total
-    for i in range(6):
-        for k in range(i):
-            p[i, k] = p[k, i] = 0.5 * (p[i, k] + p[k, i])
 
 
 @in_place

@@ -48,8 +48,6 @@ from ringbalance.scene.units import format_quantity
 
 Seed = int | np.random.Generator | None
 """Seed of random numbers, or their generator."""
-SENSOR_NOISES = 8
-"""Random numbers per sample: four of vibration, two of angles, two of rates."""
 _MAX_WHIRL = 1e3
 """Largest ratio of displacement to track radius: the plant is linear in the displacement; real bearings are
 not, far below this."""
@@ -60,40 +58,22 @@ _MAX_NUMBER = 1e100
 
 
 class _Machine(NamedTuple):
-    """Rotor, plant and sensors of a run."""
+    """Plant, speed profile and mode of a run."""
 
     plant: PlantParameters
     times: FloatArray
     """Times of the corners of the speed profile, s."""
     speeds: FloatArray
     """Speeds at the corners, rad/s."""
-    position_noise: float
-    velocity_noise: float
-    encoder_noise: float
-    encoder_rate_noise: float
     locked: bool
     """True if the masses are clamped to the track, without drive and filter."""
-
-    @classmethod
-    def of(cls, scene: EccentricScene) -> _Machine:
-        sensor, (times, speeds) = scene.sensor, scene.rotor.profile
-        return cls(
-            plant=PlantParameters.of(scene),
-            times=times,
-            speeds=speeds,
-            position_noise=sensor.position_noise,
-            velocity_noise=sensor.velocity_noise,
-            encoder_noise=sensor.encoder_noise,
-            encoder_rate_noise=sensor.encoder_rate_noise,
-            locked=scene.supervisor.strategy == "locked",
-        )
 
 
 @compiled
 def _measure(
-    machine: _Machine, settings: StrategySettings, row: FloatArray, time: float, numbers: FloatArray
+    machine: _Machine, settings: StrategySettings, row: FloatArray, time: float, noise: FloatArray
 ) -> EccentricMeasurement:
-    """Sample of the sensors, with noise. Args: `numbers`: standard normal deviates, shape (8,)."""
+    """Sample of the sensors with noise: two displacements, m, velocities, m/s, angles, rad, rates, rad/s."""
     speed, speed_rate = speed_at(machine.times, machine.speeds, time)
     turn = turned(machine.times, machine.speeds, time)
     position, velocity = complex(row[X], row[Y]), complex(row[X_RATE], row[Y_RATE])
@@ -101,11 +81,9 @@ def _measure(
         outward = complex(math.cos(turn), math.sin(turn))
         velocity = outward * (velocity + complex(0.0, speed) * position)
         position = outward * position
-    position += complex(machine.position_noise * numbers[0], machine.position_noise * numbers[1])
-    velocity += complex(machine.velocity_noise * numbers[2], machine.velocity_noise * numbers[3])
-    noise, rate_noise = machine.encoder_noise, machine.encoder_rate_noise
-    angle = (row[ANGLE] + noise * numbers[4], row[ANGLE + 1] + noise * numbers[5])
-    rate = (row[TURN] + rate_noise * numbers[6], row[TURN + 1] + rate_noise * numbers[7])
+    position, velocity = position + complex(noise[0], noise[1]), velocity + complex(noise[2], noise[3])
+    angle = (row[ANGLE] + noise[4], row[ANGLE + 1] + noise[5])
+    rate = (row[TURN] + noise[6], row[TURN + 1] + noise[7])
     return EccentricMeasurement(time, speed, speed_rate, turn, position, velocity, angle, rate)
 
 
@@ -113,7 +91,7 @@ def _measure(
 def _run_interval(
     settings: StrategySettings,
     machine: _Machine,
-    numbers: FloatArray,
+    noise: FloatArray,
     memory: Record,
     row: FloatArray,
     history: Record,
@@ -123,7 +101,7 @@ def _run_interval(
     """Run samples `first` to `after - 1`, each followed by a step of the plant, into the history."""
     energy = 0.0 if first == 0 else history[first - 1].energy
     for i in range(first, after):
-        measurement = _measure(machine, settings, row, i * settings.step, numbers[i])
+        measurement = _measure(machine, settings, row, i * settings.step, noise[i])
         if machine.locked:
             memory.cause, memory.hold = LOCKED_MASSES, RELEASED
             memory.goal[0], memory.goal[1] = row[ANGLE], row[ANGLE + 1]
@@ -228,16 +206,20 @@ def simulate_eccentric(
     Source: Fig. 3 of the paper on eccentric masses.
     """
     size = max(1, round(_INTERVAL_SUBSTEPS * scene.samples / _substeps_of(scene)))
-    settings, machine = settings or StrategySettings.of(scene), _Machine.of(scene)
+    settings, sensor = settings or StrategySettings.of(scene), scene.sensor
+    locked = scene.supervisor.strategy == "locked"
+    machine = _Machine(PlantParameters.of(scene), *scene.rotor.profile, locked)
     history, memory = np.zeros(scene.samples, dtype=HISTORY), np.zeros(1, dtype=MEMORY)
     random = np.random.default_rng(scene.run.seed if seed is None else seed)
-    numbers = random.standard_normal((scene.samples, SENSOR_NOISES))
-    row = plant_row(scene.masses.initial_angle, LOCKED if machine.locked else STUCK)
-    if not machine.locked:
-        begin_strategy(settings, memory[0], _measure(machine, settings, row, 0.0, numbers[0]))
+    of_vibration = (sensor.position_noise, sensor.velocity_noise)
+    deviations = (*of_vibration, sensor.encoder_noise, sensor.encoder_rate_noise)
+    noise = random.standard_normal((scene.samples, 8)) * np.repeat(deviations, 2)
+    row = plant_row(scene.masses.initial_angle, LOCKED if locked else STUCK)
+    if not locked:
+        begin_strategy(settings, memory[0], _measure(machine, settings, row, 0.0, noise[0]))
     for begin in range(0, scene.samples, size):
         end = min(begin + size, scene.samples)
-        _run_interval(settings, machine, numbers, memory[0], row, history, begin, end)
+        _run_interval(settings, machine, noise, memory[0], row, history, begin, end)
         if progress is not None:
             progress(end * settings.step, scene.run.time_limit)
         part = history[begin:end]

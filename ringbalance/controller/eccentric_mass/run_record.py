@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Final
@@ -326,34 +326,68 @@ class EccentricRun(PresentedResult):
         return float(np.max(np.abs(self.mass_angle[:, -1] - self.mass_angle[:, start]))) / (2 * np.pi)
 
     @cached_property
+    def _numbers(self) -> dict[str, Value]:
+        """Values by the names that sentences use; those of [supervisor] under its keys."""
+        scene, memory, worst = self.scene, self.memory, self.left
+        # Standard deviation of the imbalance by noise, kg m.
+        deviation = float(np.sqrt(np.max(np.linalg.eigvalsh(self.history["imbalance_covariance"][-1]))))
+        return {
+            **vars(scene.supervisor),
+            "final_amplitude": float(self.amplitude[-1]),
+            "time": self.end,
+            "settling_time": self.within_since,
+            "later_amplitude": None if worst is None else float(self.amplitude[worst]),
+            "later_speed": None if worst is None else float(self.speed[worst]),
+            "imbalance": abs(self.imbalance),
+            "reach": 2 * scene.masses.mass * scene.masses.guide_radius,
+            "residual": float(memory["left"]),
+            "deviation_ratio": deviation / abs(self.imbalance) if self.imbalance else None,
+            "imbalance_gate": scene.imbalance_filter.gate,
+            "friction_gate": scene.friction_filter.gate,
+            "stage": STAGE_NAMES[self.stage],
+            "turns": self.run_away,
+            "cause": CAUSE_NAMES[int(self.history["cause"][-1])].replace("_", " "),
+            "stalled_fraction": int(memory["stalled"]) / max(int(memory["driven"]), 1),
+            "saturation": self.saturation,
+            "euler_limit": _euler_limit(self),
+            "innovation": self.innovation,
+            "least_gap": self.least_gap,
+            "own_angle": scene.masses.gap,
+        }
+
+    def _finding(self, code: str) -> Finding:
+        return Finding(code=code, values={name: self._numbers[name] for name in sentences()[code].values})
+
+    @cached_property
     def ended(self) -> Finding:
         """Finding on the end of the run, with its numbers."""
-        code, supervisor = f"masses_{self.outcome.value}", self.scene.supervisor
-        if self.outcome is EccentricOutcome.RISES_AGAIN:
-            code, worst = "masses_not_kept", self.left
-            if worst is not None:
-                # Either masses have moved, or the new speed magnifies the residual imbalance.
-                first = int(np.argmax(self.history["cause"] == BALANCED))
-                moved = np.abs(self.mass_angle[:, first : worst + 1] - self.mass_angle[:, [first]])
-                still = np.max(moved, initial=0.0) <= supervisor.arrival_angle
-                by_trials = supervisor.correction == "trials"
-                code = "masses_rises_by_trials" if by_trials else "masses_rises_by_speed"
-                if not still or self.speed[worst] == self.speed[first]:
-                    code = "masses_rises_again"
         if self.outcome in OF_DRIVES and (unstable := next(_unstable(self.scene), None)):
-            numbers = {**_numbers(self), **unstable.values}
-            return replace(_finding("masses_unstable", numbers), change=unstable.change)
+            values = {**self._numbers, **unstable.values}
+            names = sentences()["masses_unstable"].values
+            finding = Finding(code="masses_unstable", values={name: values[name] for name in names})
+            return replace(finding, change=unstable.change)
+        code = f"masses_{self.outcome.value}"
         if self.outcome in OF_DRIVES and self.run_away > _RUN_AWAY_TURNS:
             saturated = self.saturation > _SATURATED_FRACTION * self.end
             code = "masses_run_away" if saturated else "masses_turn"
-        if self.outcome is EccentricOutcome.LOCKED and self.within_since is not None:
+        elif self.outcome is EccentricOutcome.LOCKED and self.within_since is not None:
             code = "masses_locked_within"
-        return _finding(code, _numbers(self))
+        elif self.outcome is EccentricOutcome.RISES_AGAIN and self.left is None:
+            code = "masses_not_kept"
+        elif self.outcome is EccentricOutcome.RISES_AGAIN and self.left is not None:
+            # Either masses have moved, or the new speed magnifies the residual imbalance.
+            first = int(np.argmax(self.history["cause"] == BALANCED))
+            moved = np.abs(self.mass_angle[:, first : self.left + 1] - self.mass_angle[:, [first]])
+            still = np.max(moved, initial=0.0) <= self.scene.supervisor.arrival_angle
+            by_trials = self.scene.supervisor.correction == "trials"
+            code = "masses_rises_by_trials" if by_trials else "masses_rises_by_speed"
+            if not still or self.speed[self.left] == self.speed[first]:
+                code = "masses_rises_again"
+        return self._finding(code)
 
     @cached_property
     def warned(self) -> tuple[Finding, ...]:
         """Findings that a user should know although the run continued."""
-        numbers = {name: value for name, value in _numbers(self).items() if value is not None}
         keys, settled = self.scene.imbalance_filter, self.outcome is EccentricOutcome.SETTLED
         unlike = self.innovation is not None and self.innovation > _WRONG_MODEL_INNOVATION
         # The Euler transition is the cause to remove first.
@@ -369,8 +403,7 @@ class EccentricRun(PresentedResult):
             "drives_stay_on": int(self.history["hold"][-1]) == HELD,
             "masses_meet": self.least_gap < self.scene.masses.gap,
         }
-        findings = (_finding(code, numbers) for code, is_due in due.items() if is_due)
-        return (*_unstable(self.scene), *findings)
+        return (*_unstable(self.scene), *(self._finding(code) for code, is_due in due.items() if is_due))
 
     @property
     def status(self) -> str:
@@ -381,10 +414,6 @@ class EccentricRun(PresentedResult):
     def warnings(self) -> tuple[str, ...]:
         """Findings that a user should know, as sentences."""
         return tuple(each.text for each in self.warned)
-
-
-def _finding(code: str, numbers: Mapping[str, Value]) -> Finding:
-    return Finding(code=code, values={name: numbers[name] for name in sentences()[code].values})
 
 
 def _euler_limit(run: EccentricRun) -> float:
@@ -407,37 +436,3 @@ def _unstable(scene: EccentricScene) -> Iterator[Finding]:
                 values={"loop": loop.name, "key": loop.key, **numbers},
                 change={loop.key: loop.recommended},
             )
-
-
-def _numbers(run: EccentricRun) -> dict[str, Value]:
-    """Numbers that sentences refer to by name."""
-    scene, worst = run.scene, run.left
-    supervisor, covariance = scene.supervisor, run.history["imbalance_covariance"][-1]
-    # Standard deviation of the imbalance by noise, kg m.
-    deviation = float(np.sqrt(np.max(np.linalg.eigvalsh(covariance))))
-    return {
-        "final_amplitude": float(run.amplitude[-1]),
-        "time": run.end,
-        "limit": supervisor.limit,
-        "settling_time": run.within_since,
-        "later_amplitude": None if worst is None else float(run.amplitude[worst]),
-        "later_speed": None if worst is None else float(run.speed[worst]),
-        "imbalance": abs(run.imbalance),
-        "reach": 2 * scene.masses.mass * scene.masses.guide_radius,
-        "residual": float(run.memory["left"]),
-        "lowest_speed": supervisor.lowest_speed,
-        "imbalance_time": supervisor.imbalance_time,
-        "deviation_ratio": deviation / abs(run.imbalance) if run.imbalance else None,
-        "imbalance_gate": scene.imbalance_filter.gate,
-        "friction_gate": scene.friction_filter.gate,
-        "positioning_time": supervisor.positioning_time,
-        "stage": STAGE_NAMES[run.stage],
-        "turns": run.run_away,
-        "cause": CAUSE_NAMES[int(run.history["cause"][-1])].replace("_", " "),
-        "stalled_fraction": int(run.memory["stalled"]) / max(int(run.memory["driven"]), 1),
-        "saturation": run.saturation,
-        "euler_limit": _euler_limit(run),
-        "innovation": run.innovation,
-        "least_gap": run.least_gap,
-        "own_angle": scene.masses.gap,
-    }

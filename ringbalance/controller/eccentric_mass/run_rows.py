@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Sequence
-from typing import Any, Final
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -20,6 +22,43 @@ from ringbalance.scene.uncertain import NORMAL_95
 _DOCUMENT_INSTANTS: Final = 2500
 """Number of instants in the document; a run has about a hundred times as many samples."""
 _BAND_INSTANTS: Final = 600
+
+
+class _Signal(NamedTuple):
+    """Signal of a run: name and unit of its key, its values, and the names of its components."""
+
+    name: str
+    unit: str
+    values: Callable[[EccentricRun], FloatArray]
+    """Shape (n,), or one row for each component."""
+    parts: tuple[str, ...] = ("",)
+    documented: bool = False
+    """True if the document has it as a list."""
+
+
+_MASSES: Final = ("1", "2")
+_SIGNALS: Final = (
+    _Signal("time", "s", lambda run: run.time, documented=True),
+    _Signal("speed", "rad_s", lambda run: run.speed, documented=True),
+    _Signal("whirl", "m", lambda run: run.history["state"][:, :2].T, ("x", "y")),
+    _Signal("amplitude", "m", lambda run: run.amplitude, documented=True),
+    _Signal("phase", "rad", lambda run: run.phase, documented=True),
+    _Signal("mass_angle", "rad", lambda run: run.mass_angle, _MASSES, documented=True),
+    _Signal("mass_rate", "rad_s", lambda run: run.mass_rate, _MASSES),
+    _Signal("goal", "rad", lambda run: run.goal, _MASSES, documented=True),
+    _Signal("voltage", "V", lambda run: run.voltage, _MASSES, documented=True),
+    _Signal("energy", "J", lambda run: run.history["energy"]),
+    _Signal("imbalance", "kg_m", lambda run: run.history["imbalance"].T, ("x", "y")),
+    _Signal(
+        "imbalance_variance",
+        "kg2_m2",
+        lambda run: run.history["imbalance_covariance"].reshape(-1, 4).T[[0, 1, 3]],
+        ("xx", "xy", "yy"),
+    ),
+    _Signal("friction_arm", "m", lambda run: run.history["friction_arm"].T, _MASSES),
+    _Signal("friction_variance", "m2", lambda run: run.history["friction_variance"].T, _MASSES),
+)
+"""Signals of a run in the order of its history's columns."""
 
 
 def eccentric_document(run: EccentricRun) -> dict[str, Any]:
@@ -59,13 +98,11 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
             "residual_kg_m": targets.residual,
             "saturated": bool(targets.saturated),
         },
-        "time_s": run.time[samples].tolist(),
-        "speed_rad_s": run.speed[samples].tolist(),
-        "amplitude_m": run.amplitude[samples].tolist(),
-        "phase_rad": run.phase[samples].tolist(),
-        "mass_angle_rad": run.mass_angle[:, samples].tolist(),
-        "goal_rad": run.goal[:, samples].tolist(),
-        "voltage_V": run.voltage[:, samples].tolist(),
+        **{
+            f"{signal.name}_{signal.unit}": signal.values(run)[..., samples].tolist()
+            for signal in _SIGNALS
+            if signal.documented
+        },
         "drive_off": run.drive_off[samples].tolist(),
         "estimates": {
             "imbalance_kg_m": run.history["imbalance"][samples].T.tolist(),
@@ -82,69 +119,43 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
 
 def eccentric_history(run: EccentricRun) -> dict[str, Sequence[Any]]:
     """Columns of every sample by name; vectors rotor-fixed, angles not wrapped."""
-    history = run.history
+    columns = {}
+    for signal in _SIGNALS:
+        for part, values in zip(signal.parts, np.atleast_2d(signal.values(run)), strict=True):
+            columns["_".join(filter(None, (signal.name, part, signal.unit)))] = values.tolist()
     stages = run.stages
-    stage_index = np.searchsorted([stage.start for stage in stages], run.time, side="right") - 1
-    columns: dict[str, FloatArray] = {
-        "time_s": run.time,
-        "speed_rad_s": run.speed,
-        "whirl_x_m": run.whirl.real,
-        "whirl_y_m": run.whirl.imag,
-        "amplitude_m": run.amplitude,
-        "phase_rad": run.phase,
-        **_each("mass_angle_{}_rad", run.mass_angle),
-        **_each("mass_rate_{}_rad_s", run.mass_rate),
-        **_each("goal_{}_rad", run.goal),
-        **_each("voltage_{}_V", run.voltage),
-        "energy_J": run.history["energy"],
-        "imbalance_x_kg_m": history["imbalance"][:, 0],
-        "imbalance_y_kg_m": history["imbalance"][:, 1],
-        "imbalance_variance_xx_kg2_m2": history["imbalance_covariance"][:, 0, 0],
-        "imbalance_variance_xy_kg2_m2": history["imbalance_covariance"][:, 0, 1],
-        "imbalance_variance_yy_kg2_m2": history["imbalance_covariance"][:, 1, 1],
-        **_each("friction_arm_{}_m", history["friction_arm"].T),
-        **_each("friction_variance_{}_m2", history["friction_variance"].T),
-    }
-    return {
-        **{name: values.tolist() for name, values in columns.items()},
-        "drive_off": run.drive_off.astype(int).tolist(),
-        "stage": [stages[index].name for index in stage_index],
-    }
-
-
-def _each(name: str, values: FloatArray) -> dict[str, FloatArray]:
-    return {name.format(mass): row for mass, row in enumerate(values, start=1)}
+    index = np.searchsorted([stage.start for stage in stages], run.time, side="right") - 1
+    names = np.array([stage.name for stage in stages])
+    return {**columns, "drive_off": run.drive_off.astype(int).tolist(), "stage": names[index].tolist()}
 
 
 def eccentric_rows(run: EccentricRun) -> Rows:
     """Quantities, findings and stages of the run."""
-    x, y = (float(each) for each in run.history["imbalance"][-1])
     width = NORMAL_95 * math.sqrt(float(np.max(np.linalg.eigvalsh(run.imbalance_covariance))))
-    size = math.hypot(x, y)
+    arms, places = run.history["friction_arm"][-1].tolist(), np.mod(run.mass_angle[:, -1], math.tau).tolist()
     values: list[tuple[str, str, str, float | None, float]] = [
         ("settling_time", "settling time", "s", run.settling_time, 0.0),
         ("final_amplitude", "amplitude at the end", "m", run.final_amplitude, 0.0),
         ("worst_amplitude", "amplitude at worst", "m", run.worst_amplitude, 0.0),
         ("limit", "limit", "m", run.limit, 0.0),
         ("residual_ratio", "of the vibration without balancing", "1", run.residual_ratio, 0.0),
-        ("imbalance", "imbalance", "kg m", size, width),
-        ("imbalance_angle", "angle of the imbalance", "rad", math.atan2(y, x) % math.tau, 0.0),
+        ("imbalance", "imbalance", "kg m", abs(run.imbalance), width),
+        ("imbalance_angle", "angle of the imbalance", "rad", cmath.phase(run.imbalance) % math.tau, 0.0),
         ("energy", "electrical energy", "J", run.electrical_energy, 0.0),
+        *(
+            (f"friction_arm_{number}", f"friction arm of mass {number}", "m", arm, half)
+            for number, arm, half in zip((1, 2), arms, run.friction_half_width.tolist(), strict=True)
+        ),
+        *(
+            (f"mass_angle_{number}", f"mass {number} at", "rad", angle, 0.0)
+            for number, angle in zip((1, 2), places, strict=True)
+        ),
     ]
-    arms = zip(run.history["friction_arm"][-1], run.friction_half_width, strict=True)
-    for number, (arm, half) in enumerate(arms, start=1):
-        values.append(
-            (f"friction_arm_{number}", f"friction arm of mass {number}", "m", float(arm), float(half))
-        )
-    for number, angle in enumerate(run.mass_angle[:, -1], start=1):
-        values.append((f"mass_angle_{number}", f"mass {number} at", "rad", float(angle) % math.tau, 0.0))
     quantities = []
     for key, name, unit, value, half in values:
         low, high = (None, None) if value is None else around(value, half)
-        origin = "given" if key == "limit" else "simulated"
-        quantities.append(
-            Quantity(key=key, name=name, unit=unit, value=value, lower=low, upper=high, origin=origin)
-        )
+        quantity = Quantity(key=key, name=name, unit=unit, value=value, lower=low, upper=high)
+        quantities.append(replace(quantity, origin="given" if key == "limit" else "simulated"))
     ends = np.searchsorted(run.time, [stage.end for stage in run.stages])
     stages = [
         (stage.name, f"{stage.start:.3f}", f"{stage.end:.3f}", format_given(float(amplitude), "m", digits=4))

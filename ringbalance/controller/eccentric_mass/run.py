@@ -57,7 +57,7 @@ _MAX_NUMBER = 1e100
 """Largest number in a history, in any unit: its squares and products stay finite."""
 
 
-class _Machine(NamedTuple):
+class Machine(NamedTuple):
     """Plant, speed profile and mode of a run."""
 
     plant: PlantParameters
@@ -68,10 +68,27 @@ class _Machine(NamedTuple):
     locked: bool
     """True if the masses are clamped to the track, without drive and filter."""
 
+    @classmethod
+    def of(cls, scene: EccentricScene) -> Machine:
+        """Derive plant and profile from a scene."""
+        return cls(PlantParameters.of(scene), *scene.rotor.profile, scene.supervisor.strategy == "locked")
+
+
+SENSOR_NOISES: Final = 8
+"""Random numbers per sample: four of vibration, two of angles, two of rates."""
+
+
+def sensor_noise(scene: EccentricScene, seed: Seed) -> FloatArray:
+    """Noise of the sensors in all samples of a run, m, m/s, rad and rad/s, shape (n, 8)."""
+    sensor, random = scene.sensor, np.random.default_rng(seed)
+    of_vibration = (sensor.position_noise, sensor.velocity_noise)
+    deviations = np.repeat((*of_vibration, sensor.encoder_noise, sensor.encoder_rate_noise), 2)
+    return np.asarray(random.standard_normal((scene.samples, SENSOR_NOISES)) * deviations)
+
 
 @compiled
-def _measure(
-    machine: _Machine, settings: StrategySettings, row: FloatArray, time: float, noise: FloatArray
+def measure(
+    machine: Machine, settings: StrategySettings, row: FloatArray, time: float, noise: FloatArray
 ) -> EccentricMeasurement:
     """Sample of the sensors with noise: two displacements, m, velocities, m/s, angles, rad, rates, rad/s."""
     speed, speed_rate = speed_at(machine.times, machine.speeds, time)
@@ -90,7 +107,7 @@ def _measure(
 @compiled
 def _run_interval(
     settings: StrategySettings,
-    machine: _Machine,
+    machine: Machine,
     noise: FloatArray,
     memory: Record,
     row: FloatArray,
@@ -101,7 +118,7 @@ def _run_interval(
     """Run samples `first` to `after - 1`, each followed by a step of the plant, into the history."""
     energy = 0.0 if first == 0 else history[first - 1].energy
     for i in range(first, after):
-        measurement = _measure(machine, settings, row, i * settings.step, noise[i])
+        measurement = measure(machine, settings, row, i * settings.step, noise[i])
         if machine.locked:
             memory.cause, memory.hold = LOCKED_MASSES, RELEASED
             memory.goal[0], memory.goal[1] = row[ANGLE], row[ANGLE + 1]
@@ -206,17 +223,12 @@ def simulate_eccentric(
     Source: Fig. 3 of the paper on eccentric masses.
     """
     size = max(1, round(_INTERVAL_SUBSTEPS * scene.samples / _substeps_of(scene)))
-    settings, sensor = settings or StrategySettings.of(scene), scene.sensor
-    locked = scene.supervisor.strategy == "locked"
-    machine = _Machine(PlantParameters.of(scene), *scene.rotor.profile, locked)
+    settings, machine = settings or StrategySettings.of(scene), Machine.of(scene)
     history, memory = np.zeros(scene.samples, dtype=HISTORY), np.zeros(1, dtype=MEMORY)
-    random = np.random.default_rng(scene.run.seed if seed is None else seed)
-    of_vibration = (sensor.position_noise, sensor.velocity_noise)
-    deviations = (*of_vibration, sensor.encoder_noise, sensor.encoder_rate_noise)
-    noise = random.standard_normal((scene.samples, 8)) * np.repeat(deviations, 2)
-    row = plant_row(scene.masses.initial_angle, LOCKED if locked else STUCK)
-    if not locked:
-        begin_strategy(settings, memory[0], _measure(machine, settings, row, 0.0, noise[0]))
+    noise = sensor_noise(scene, scene.run.seed if seed is None else seed)
+    row = plant_row(scene.masses.initial_angle, LOCKED if machine.locked else STUCK)
+    if not machine.locked:
+        begin_strategy(settings, memory[0], measure(machine, settings, row, 0.0, noise[0]))
     for begin in range(0, scene.samples, size):
         end = min(begin + size, scene.samples)
         _run_interval(settings, machine, noise, memory[0], row, history, begin, end)

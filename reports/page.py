@@ -284,4 +284,7 @@ def _share_styles(page: str) -> str:
 
 
 def _template(name: str) -> str:
-    return files("ringbalance.reports").joinpath("templates", name).read_text(encoding="utf-8")
+    # One of another package is named "package:file".
+    package, _, file = name.rpartition(":")
+    folder = files(package) if package else files("ringbalance.reports") / "templates"
+    return (folder / file).read_text(encoding="utf-8")

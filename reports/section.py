@@ -69,7 +69,7 @@ class Section:
     always: bool = False
     """True if the section is shown even without evidence, then with an empty record."""
     template: str = ""
-    """File in `templates`; empty: the one of the section's name."""
+    """File in `templates`, or "package:file" of another package; empty: the one of the section's name."""
 
     def jobs(self, work: Work) -> list[Job]:
         """Jobs that collect its evidence, the last under its own name; none where it collects nothing."""

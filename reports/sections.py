@@ -27,6 +27,7 @@ from ringbalance.reports.pages import (
 )
 from ringbalance.reports.pages.standing import CASES, CONDITIONS, CREDIBILITY, DEFAULTS, DOCUMENT, PARAMETERS
 from ringbalance.reports.section import Document, Record, Section
+from ringbalance.scene.registry import registered_or_none
 
 SECTIONS: Final[tuple[Section, ...]] = (
     first_page.SECTION,
@@ -69,7 +70,8 @@ PREFIXES: Final[Mapping[Document, str]] = MappingProxyType({"report": "", "annex
 
 def sections_of(balancer: str) -> dict[str, Section]:
     """The sections of a report on a kind of balancer, in the page's order, by name."""
-    return {section.name: section for section in _BY_BALANCER.get(balancer, plain.SECTIONS)}
+    sections = _BY_BALANCER.get(balancer) or registered_or_none("report", balancer) or plain.SECTIONS
+    return {section.name: section for section in sections}
 
 
 def view_of(name: str, evidence: Record) -> Record | None:

@@ -357,6 +357,22 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         "SCENE --out pictures",
         "this machine cannot draw; the fields are written",
     ),
+    "check-balancer": ShellCommand(
+        """Check that a balancer, such as one of another package, is what every command expects.
+
+        Args:
+            name: the word of the scene's key balancer.
+            scene: one of its scenes, with short runs; default the example that its package brings.
+        """,
+        _options(
+            "name scene json",
+            name=ShellOption(str, REQUIRED, kind=Parameter.POSITIONAL_OR_KEYWORD),
+            scene=_PATH,
+        ),
+        "ball --json",
+        "a check fails",
+        begin="checks ...",
+    ),
     "doctor": ShellCommand(
         """Check this machine: versions, packages, drawing, compiler and processes, with advice.
 

@@ -17,9 +17,13 @@ from rich.markup import escape
 from rich.table import Table
 
 import ringbalance
+from ringbalance.controller.balancer import balancer_class_of
 from ringbalance.reports.pictures.opengl import find_opengl
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.platform.kept_code import CODE, code_root, trusted
 from ringbalance.scene.platform.terminal import results_console
+from ringbalance.scene.registry import installed_balancers, known_balancers
 
 State = Literal["ok", "absent", "broken"]
 _WORDS: Final = {"ok": "ok", "absent": "not there", "broken": "to mend"}
@@ -62,6 +66,7 @@ def checks() -> Iterator[MachineCheck]:
         yield MachineCheck("C compiler", "absent", "none found; only what is exported to C needs one")
     else:
         yield MachineCheck("C compiler", "ok", compiler)
+    yield from _balancers()
     yield _kept_code()
     yield _processes()
 
@@ -78,6 +83,22 @@ def doctor(options: SimpleNamespace) -> int:
             table.add_row(_WORDS[check.state], check.name, escape(text))
         results_console().print(table, highlight=False)
     return int(any(check.state == "broken" for check in results))
+
+
+def _balancers() -> Iterator[MachineCheck]:
+    """Check that balancers of other packages can be used."""
+    for name, package in installed_balancers().items():
+        taken, advice = name in known_balancers(), f"ask who made {package}, or uninstall it"
+        try:
+            scene_kind(name)
+            balancer_class_of(name)
+        except SceneError as error:
+            yield MachineCheck(f"balancer {name}", "broken", error.faults[0].problem, advice)
+            continue
+        text = f"of {package}"
+        if taken:
+            text += ", which is not used: the program has a balancer of that name"
+        yield MachineCheck(f"balancer {name}", "broken" if taken else "ok", text, advice if taken else "")
 
 
 def _kept_code() -> MachineCheck:

@@ -31,6 +31,7 @@ TARGETS: Final = {
     "trade": "ringbalance.studies:trade",
     "extremes": "ringbalance.studies:extremes_file",
     "plot": "ringbalance.reporting:plot_file",
+    "check-balancer": "ringbalance.balancers:check_balancer",
     "doctor": "ringbalance.doctor:doctor",
 }
 """Module and function of each command, imported when it runs."""
@@ -59,7 +60,7 @@ def run_command(name: str, /, **settings: Any) -> int:
     if not command.begin:
         return int(target(SimpleNamespace(**options)))
     changes = options.get("tolerance"), options.get("seed")
-    options |= {key: opened(options[key], *changes) for key in SCENES if key in options}
+    options |= {key: opened(options[key], *changes) for key in SCENES if options.get(key)}
     if options.get("valves"):
         options["scene"] = imported("ringbalance.design.choices:with_valves")(
             options["scene"], options["valves"]

@@ -55,7 +55,7 @@ def test_links_into_a_page_lead_to_a_heading(page: str) -> None:
 
 @pytest.mark.parametrize("page", ["README.md", "docs/commands.md"])
 def test_the_commands_are_those_registered(page: str) -> None:
-    listed = re.findall(r"^\| `ringbalance (\w+)", text(page), re.MULTILINE)
+    listed = re.findall(r"^\| `ringbalance ([\w-]+)", text(page), re.MULTILINE)
     assert sorted(listed) == sorted(COMMANDS)
 
 

@@ -18,6 +18,7 @@ from typing import Any, Literal, TypeVar
 
 from ringbalance.results.numbers import MISSING, Width, believed, format_given, plain, short, shown, with_unit
 from ringbalance.results.requirements import Proportion
+from ringbalance.scene.registry import registered
 from ringbalance.scene.uncertain import NORMAL_95
 
 Made = TypeVar("Made")
@@ -134,12 +135,12 @@ class Finding:
     @property
     def severity(self) -> Severity:
         """Severity of the code."""
-        return sentences()[self.code].severity
+        return sentence_of(self.code).severity
 
     @property
     def changes(self) -> dict[str, float | str]:
         """Changes by path of a key in the scene: "raise", "lower", "set", or the value, SI."""
-        return {**sentences()[self.code].change, **self.change}
+        return {**sentence_of(self.code).change, **self.change}
 
     @property
     def text(self) -> str:
@@ -149,7 +150,7 @@ class Finding:
     def sentence(self, mark: Mark = lambda _name, text: text) -> str:
         """The sentence with typographic signs; each number goes through `mark`."""
         values = {name: _Filled(name, value, mark) for name, value in self.values.items()}
-        return Formatter().vformat(sentences()[self.code].text, (), values)
+        return Formatter().vformat(sentence_of(self.code).text, (), values)
 
     def document(self) -> dict[str, Any]:
         """Record for JSON; a quantity is written as its value."""
@@ -187,6 +188,12 @@ def sentences() -> Mapping[str, _Sentence]:
     """All codes with their sentences, in the order of the file."""
     content = (files("ringbalance.results") / "sentences.toml").read_text(encoding="utf-8")
     return {code: _Sentence(**entry) for code, entry in tomllib.loads(content).items()}
+
+
+def sentence_of(code: str) -> _Sentence:
+    """Sentence of a code; "name.code" is one of a balancer, which brings its own (`registry.register`)."""
+    balancer, dot, rest = code.partition(".")
+    return _Sentence(**registered("sentences", balancer)[rest]) if dot else sentences()[code]
 
 
 def series(names: Sequence[str]) -> str:

@@ -27,6 +27,8 @@ class SceneKind:
     """Paths of the values that a terminal shows, line by line."""
     usual_units: Mapping[str, str] = field(default_factory=dict)
     """Displayed unit by dimension where a declaration names none; default the SI unit."""
+    example: str = ""
+    """Text of a scene file, for `ringbalance check-balancer`."""
     arrays: bool = False
     """True if numbers may be arrays for many designs at once, see `ringbalance.scene.designs`."""
 

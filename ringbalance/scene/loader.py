@@ -234,20 +234,24 @@ def _fields(kind: type, table: str) -> tuple[tuple[str, str, Any], ...]:
 
 
 def _kind(content: SceneInput) -> str:
-    """Kind of balancer: the file's word, or the default.
-
-    Raises: SceneError: no balancer of that name is installed; what else the file holds cannot be judged.
-    """
+    """Kind of balancer: the file's word, or the default."""
     if "balancer" not in content.document:
         return known_balancers()[0]
-    word = content.document["balancer"]
+    return balancer_name(content.document["balancer"], file=content.file)
+
+
+def balancer_name(word: object, *, file: str, key: str = "balancer") -> str:
+    """The word of a key or an option that names an installed balancer.
+
+    Raises: SceneError: none of that name is installed; what else the file holds cannot be judged then.
+    """
     if isinstance(word, str) and has_balancer(word):
         return word
     packages = installed_balancers()
     names = dict.fromkeys([*known_balancers(), *packages])
     fault = Fault(
-        file=content.file,
-        key="balancer",
+        file=file,
+        key=key,
         value=toml_text(word),
         problem="no balancer of this name is installed"
         + (did_you_mean(word, names) if isinstance(word, str) else ""),

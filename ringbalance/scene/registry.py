@@ -94,9 +94,12 @@ def registered(part: Part, name: str) -> Any:
         raise unusable(name, f"{path}: {_reason(error)}") from error
 
 
-def has(part: Part, name: str) -> bool:
-    """True if something is registered under a name, without loading it."""
-    return (part, name) in _PATHS
+def registered_or_none(part: Part, name: str) -> Any:
+    """Object registered under a name; None if the balancer of that name brings none."""
+    try:
+        return registered(part, name)
+    except KeyError:
+        return None
 
 
 def unusable(name: str, problem: str) -> SceneError:
@@ -127,7 +130,7 @@ def _load(name: str) -> None:
         if len(points) > 1:
             raise ValueError("each of these packages brings a balancer of that name; uninstall the others")
         points[0].load()()
-        if not has("scene", name):
+        if ("scene", name) not in _PATHS:
             raise LookupError(f"{points[0].value} registers no balancer of that name")
     except (Exception, SystemExit) as error:
         _PATHS.clear()

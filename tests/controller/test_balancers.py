@@ -1,25 +1,31 @@
+# ruff: noqa: ARG001, ARG005 (methods in place of others have their arguments)
 """A third balancer, one sub-package and one line to register it; the same checks hold for all three."""
 
 from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
+from random import random
+from typing import Any
 
 import numpy as np
 import pytest
-from balancer_checks import CHECKS, Check, short
+from ball_balancer.balancer import BallBalancer
 from ball_balancer.scene_keys import BallScene
 from own_balancers import EXAMPLE
 
 import ringbalance as rb
 from ringbalance.cli import main
-from ringbalance.controller.balancer import Balancer, balancer_of
+from ringbalance.controller.balancer import Balancer, Outcomes, balancer_of
+from ringbalance.controller.balancer_checks import CHECKS, Check, checked_scene, description, problems_of
 from ringbalance.controller.compare import compare
 from ringbalance.identification.reading import template
+from ringbalance.scene import registry
 from ringbalance.scene.loader import bundled_scene, load_scene, scene_from
 from ringbalance.scene.narrowing import scene_as
-from ringbalance.scene.registry import known_balancers
+from ringbalance.scene.registry import imported, known_balancers
 
 pytestmark = pytest.mark.usefixtures("ball_registered")
 
@@ -38,7 +44,7 @@ def balancer(request: pytest.FixtureRequest, balls: BallScene) -> Balancer:
         "liquid_ring": ("six_chamber", 4.0),
         "eccentric_mass": ("driven_masses_small", 3.0),
     }[request.param]
-    return short(load_scene(bundled_scene(name)), seconds)
+    return balancer_of(load_scene(bundled_scene(name)).with_values({"run.time_limit": seconds}))
 
 
 def test_every_balancer_is_checked() -> None:
@@ -47,7 +53,100 @@ def test_every_balancer_is_checked() -> None:
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_every_balancer(balancer: Balancer, check: Check) -> None:
-    check(balancer)
+    assert problems_of(check, balancer) == ()
+
+
+def _outcomes(**changes: Any) -> dict[str, Any]:
+    """A `run` whose outcomes are changed."""
+
+    def run(self: BallBalancer, *args: Any, **options: Any) -> Outcomes:
+        outcomes = BallBalancer.run(self, *args, **options)
+        return replace(outcomes, **{name: change(outcomes, args) for name, change in changes.items()})
+
+    return {"run": run}
+
+
+def _nothing(self: BallBalancer, *_: Any, **__: Any) -> tuple[Any, ...]:
+    return ()
+
+
+MUTATIONS: dict[str, dict[str, Any]] = {
+    "inputs": {"inputs": _nothing},
+    "settings": {"settings": _nothing},
+    "stated_settings": _outcomes(
+        final_amplitude=lambda outcomes, args: outcomes.final_amplitude + bool(args[0]) * 1e-9
+    ),
+    "effects": {"setting_paths": ("vibration.noise",)},
+    "repeatable": _outcomes(final_amplitude=lambda outcomes, _: outcomes.final_amplitude + random()),
+    "numbers": _outcomes(final_amplitude=lambda outcomes, _: np.arange(outcomes.final_amplitude.size) + 1e-6),
+    "devices": _outcomes(final_amplitude=lambda outcomes, _: 0 * outcomes.final_amplitude),
+    "settling_times": _outcomes(ended=lambda outcomes, _: ("stalled",) * len(outcomes.ended)),
+    "one_run": {"history": lambda self, run: {"time_s": [0.0], "amplitude_m": []}},
+    "traces": {
+        "run": lambda self, *args, trace=False, **options: BallBalancer.run(
+            self.lasting(20.0 if trace else 1.0), *args, trace=trace, **options
+        )
+    },
+    "untraced": {
+        "run": lambda self, *args, trace=False, **options: BallBalancer.run(
+            self, *args, trace=True, **options
+        )
+    },
+    "rotor": {
+        "on_rotor": lambda self, rotor, rotors=None: self.on_scene(
+            self.scene.with_values({"rotor.phase": "3 deg"})
+        )
+    },
+    "span": {"lasting": lambda self, span: self},
+    "pickles": {"__reduce__": lambda self: (type(self), (self.scene.with_values({"run.seed": 9}),))},
+    "options": {"options": frozenset(["colour"])},
+}
+
+
+@pytest.mark.parametrize("name", MUTATIONS)
+def test_every_check_notices_its_error(balls: BallScene, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Wrong(BallBalancer):
+        pass
+
+    for attribute, value in MUTATIONS[name].items():
+        setattr(Wrong, attribute, value)
+    monkeypatch.setitem(registry._PATHS, ("balancer", "ball"), f"{__name__}:WRONG")
+    monkeypatch.setitem(globals(), "WRONG", Wrong)
+    monkeypatch.setattr(
+        registry, "imported", lambda path: Wrong if path.endswith("WRONG") else imported(path)
+    )
+    (check,) = (check for check in CHECKS if check.__name__ == name)
+    assert problems_of(check, Wrong(balls)) != ()
+
+
+def test_the_checks_of_the_last_two_notice_scenes_that_nobody_checks(
+    balls: BallScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(BallScene, "with_values", lambda self, values: self)
+    assert problems_of(checked_scene, BallBalancer(balls)) != ()
+    monkeypatch.setattr(BallScene, "__repr__", lambda self: "a scene")
+    assert problems_of(description, BallBalancer(balls)) != ()
+
+
+def test_the_command_prints_every_check(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check-balancer", "ball", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["passed"]
+    assert len(document["checks"]) == len(CHECKS) == 17
+    assert main(["check-balancer", "liquid_ring"]) == 2
+    assert "its package brings no example; allowed: --scene SCENE with it" in capsys.readouterr().err
+    assert main(["check-balancer", "ball", "--scene", "six_chamber"]) == 2
+    assert "this is a scene of the balancer liquid_ring" in capsys.readouterr().err
+
+
+def test_a_failed_check_is_said_with_its_reason(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(BallBalancer, "lasting", lambda self, span: self)
+    assert main(["check-balancer", "ball"]) == 1
+    text = " ".join(capsys.readouterr().out.split())
+    assert "the balancer ball fails 1 of 17 checks" in text
+    assert "20.0 s in place of 7.5 s" in text
 
 
 def test_balls_above_the_critical_speed_balance_and_below_it_do_not(balls: BallScene) -> None:
@@ -80,7 +179,7 @@ def test_the_commands_take_the_third_balancer(tmp_path: Path, capsys: pytest.Cap
     assert main(["simulate", str(file), "--json", "--plot", str(plot), "--csv", str(table)]) == 0
     assert json.loads(capsys.readouterr().out)["balancer"] == "ball"
     assert plot.stat().st_size > 1000
-    assert table.read_text().startswith("time_s,amplitude_m\n")
+    assert table.read_text().startswith("time_s,amplitude_m,")
     assert main(["tune", str(file), "--save", str(tmp_path / "tuned.toml")]) == 0
     assert "balls.drag" in capsys.readouterr().out
     assert load_scene(tmp_path / "tuned.toml").balancer == "ball"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 BALLS: Final = Path(__file__).parents[2] / "docs" / "examples" / "ball-balancer"
-EXAMPLE: Final = (BALLS / "balls.toml").read_bytes()
+EXAMPLE: Final = (BALLS / "ball_balancer" / "balls.toml").read_bytes()
 
 
 def described(folder: Path, name: str, version: str, points: dict[str, str]) -> None:

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from own_balancers import BALLS, described, install_balls
+from own_balancers import EXAMPLE, described, install_balls
 
 SAY = """
 import sys
@@ -43,7 +43,7 @@ def beside(tmp_path: Path) -> Path:
 
 def scene(tmp_path: Path, balancer: str) -> str:
     path = tmp_path / "my.toml"
-    text = (BALLS / "balls.toml").read_text().replace('balancer = "ball"', f'balancer = "{balancer}"')
+    text = EXAMPLE.decode().replace('balancer = "ball"', f'balancer = "{balancer}"')
     path.write_text(text)
     return str(path)
 

@@ -43,7 +43,7 @@ class Answer:
         point = self.design.point
         keys = (
             f"bore {1e3 * point['tube.bore']:.3g} mm, {point['gas.pressure'] / 1e6:.3g} MPa, "
-            f"{self.design.space.valve(point)}"
+            f"{', '.join(self.design.space.names(point).values())}"
         )
         return (
             f"start {self.start}, seed {self.seed}: {1e6 * self.design.size:.1f} ml, {keys}; "

@@ -9,9 +9,26 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+from matplotlib.axes import Axes
+
+from ringbalance.design.racing import DEVICES
 from ringbalance.identification.documents import against_fit
 from ringbalance.reduced_model import paper
-from ringbalance.reports.figure import AS_PAPER, FOUND, PAPER, Drawing, curve, draw, level, logarithmic, sheet
+from ringbalance.reports.figure import (
+    AS_PAPER,
+    FOUND,
+    INK,
+    MUTED,
+    PAPER,
+    Drawing,
+    Paint,
+    curve,
+    draw,
+    level,
+    line,
+    logarithmic,
+    sheet,
+)
 from ringbalance.reports.judged import judgement_record, settled_record
 from ringbalance.reports.pages.chamber import MOMENT
 from ringbalance.reports.pages.loop import SETTINGS, settling
@@ -21,6 +38,7 @@ from ringbalance.reports.pages.tube import TUBE
 from ringbalance.reports.run_figures import figures_of
 from ringbalance.reports.sections import drawings_in
 from ringbalance.reports.sweep_figures import sweep_drawings
+from ringbalance.results.requirements import MET, MISSED, OPEN
 from ringbalance.results.result import Result
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.verification import papers
@@ -52,7 +70,7 @@ class _ResultFigures:
 
 
 def figures_of_result(result: Result) -> _ResultFigures:
-    """Figures of a calibration, a run, a tuning, a fit, a comparison, a trade study or a sweep.
+    """Figures of a calibration, a run, a tuning, a design, a fit, a comparison, a trade study or a sweep.
 
     Raises: TypeError: a result of another type.
     """
@@ -89,6 +107,42 @@ def _comparison(result: Any) -> list[Drawing]:
     return drawings_in([settling(curves, result.asked)])
 
 
+def _design(result: Any) -> list[Drawing]:
+    """Fraction of devices and gas pressure of the designs that ran, over their volume, or over the gas where
+    no volume varies: those with a verdict on many devices large, the chosen one in a ring."""
+    space, judged = result.space, [(each, each.race.judgement) for each in result.tried]
+    if not judged:
+        return []
+    across = ("volume of the cylinder around the chambers", "m^3") if space.sized else ("gas, median", "J")
+    names = [", ".join(space.names(each.point).values()) or "design" for each, _ in judged]
+    looks = {name: line(index, size=7) for index, name in enumerate(sorted(set(names)))}
+    fills = {MET: "full", OPEN: "left", MISSED: "none"}
+
+    def drawing(stem: str, y: str, unit: str, heights: list[float], *paints: Paint) -> Drawing:
+        def paint(axes: Axes) -> None:
+            for (each, judgement), name, height in zip(judged, names, heights, strict=True):
+                at = [each.size if space.sized else each.race.gas], [height]
+                few = {} if judgement.meets.size > DEVICES else {"markersize": 4.5}
+                axes.plot(*at, **looks[name] | few, linestyle="", fillstyle=fills[judgement.verdict])
+                if each.point == result.point:
+                    ring: dict[str, Any] = {"color": INK, "marker": "o", "markersize": 13, "label": "chosen"}
+                    axes.plot(*at, **ring, linestyle="", fillstyle="none")
+            for name, look in looks.items():
+                axes.plot([], [], **look, linestyle="", label=name)
+            for verdict, fill in fills.items():
+                axes.plot([], [], color=MUTED, marker="o", linestyle="", fillstyle=fill, label=verdict)
+
+        return draw(stem, paint, *paints, x=across, y=(y, unit), columns=8, wide=True)
+
+    fractions = [100 * judgement.fraction.value for _, judgement in judged]
+    required = level(100 * judged[0][1].required_fraction, "required", color=PAPER, linestyle=":")
+    drawings = [drawing("design-fraction", "devices that meet all, in %", "1", fractions, required)]
+    if "gas.pressure" in space.paths:
+        pressures = [each.point["gas.pressure"] for each, _ in judged]
+        drawings.append(drawing("design-pressure", "gas pressure, gauge", "Pa", pressures))
+    return drawings
+
+
 def _trade(result: Any) -> list[Drawing]:
     """Error over designs per second for every timed model."""
     drawings = []
@@ -119,6 +173,7 @@ _FIGURES: Final[Mapping[str, Callable[[Any], list[Drawing]]]] = MappingProxyType
         "EccentricRun": lambda run: figures_of(run.scene, run),
         "Tuning": _tuning,
         "Comparison": _comparison,
+        "Design": _design,
         "Fit": lambda fit: fit_figures(against_fit(fit.result)),
         "Sweep": sweep_drawings,
         "TradeStudy": _trade,

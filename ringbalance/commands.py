@@ -251,8 +251,10 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
             in_place: keep the disc's size, and choose bore, pressure, siphon crest, gas hole and valve;
                 [design] may be left out, and a later report shows the answer.
             save: write the scene of the design, with its settings.
+            plot: also draw the designs that were judged, an SVG file: fraction of devices and gas pressure
+                over the volume, with what meets the requirement filled and the chosen one in a ring.
         """,
-        _options("scene in_place save valves seed workers json"),
+        _options("scene in_place save plot valves seed workers json"),
         "SCENE --save designed.toml",
         "no design meets the requirement of the scene, or it is undecided",
         begin="designs ...",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from inspect import signature
 from json import dumps
 from types import SimpleNamespace
 from typing import Any, Final
 
-from ringbalance.commands import COMMANDS
+from ringbalance.commands import COMMANDS, ShellCommand
 from ringbalance.interface import SCENES, law_for, opened, print_result
 from ringbalance.scene.changes import file_text
 from ringbalance.scene.faults import SceneError
@@ -41,21 +42,7 @@ def run_command(name: str, /, **settings: Any) -> int:
     """Run a command; options without a setting have their defaults. Returns: Exit code."""
     command = COMMANDS[name]
     options = {key: each.default for key, each in command.options.items()} | settings
-    for key, option in command.options.items():
-        value, limits = options[key], option.limits
-        if value is None:
-            continue
-        if limits and not limits.least <= value <= limits.most:
-            raise SceneError.of_option(
-                option=f"--{key}", value=value, problem=limits.problem, allowed=limits.allowed
-            )
-        if option.ending is None:
-            continue
-        if not value.name.lower().endswith(option.ending):
-            problem = "this name does not say what is written"
-            allowed = f"a file name that ends in {option.ending}"
-            raise SceneError.of_option(option=f"--{key}", value=str(value), problem=problem, allowed=allowed)
-        check_file(value, apart_from=options.get("scene"))
+    _check_options(command, options)
     target = imported(TARGETS[name])
     if not command.begin:
         return int(target(SimpleNamespace(**options)))
@@ -77,12 +64,18 @@ def run_command(name: str, /, **settings: Any) -> int:
     with activity(name, command.begin) as shown:
         options["progress"] = shown.show
         result = work(**{key: options[key] for key in signature(work).parameters if key in options})
-    save, law = options.get("save"), getattr(result, "flow_law", None)
+    # A search that could judge no design has nothing to save or to draw.
+    save, law, judged = (
+        options.get("save"),
+        getattr(result, "flow_law", None),
+        getattr(result, "judgement", result),
+    )
     if save and law:
         law.save(save)
-    elif save and getattr(result, "judgement", result):
-        # A search that could judge no design has nothing to save.
+    elif save and judged:
         write_whole(save, file_text(result.recommended_scene, to=save.parent))
+    if options.get("plot") and judged:
+        result.plot(options["plot"])
     print_result(result, json=options["json"], headline=command.headline)
     if file is not None:
         write_whole(file, dumps(result.to_dict(), allow_nan=False) + "\n")
@@ -90,3 +83,22 @@ def run_command(name: str, /, **settings: Any) -> int:
     if save and law:
         print_message(f"law written to {save}")
     return 0 if getattr(result, "succeeded", True) else 1
+
+
+def _check_options(command: ShellCommand, options: Mapping[str, Any]) -> None:
+    """Refuse numbers outside their limits, and files of another kind or that cannot be written."""
+    for key, option in command.options.items():
+        value, limits = options[key], option.limits
+        if value is None:
+            continue
+        if limits and not limits.least <= value <= limits.most:
+            raise SceneError.of_option(
+                option=f"--{key}", value=value, problem=limits.problem, allowed=limits.allowed
+            )
+        if option.ending is None:
+            continue
+        if not value.name.lower().endswith(option.ending):
+            problem = "this name does not say what is written"
+            allowed = f"a file name that ends in {option.ending}"
+            raise SceneError.of_option(option=f"--{key}", value=str(value), problem=problem, allowed=allowed)
+        check_file(value, apart_from=options.get("scene"))

@@ -18,7 +18,7 @@ from ringbalance.controller.judging.tuning import (
     reported_quantities,
     required_table,
 )
-from ringbalance.design.designing import VALVE, Design
+from ringbalance.design.designing import Design
 from ringbalance.results.numbers import MISSING, format_given, percent
 from ringbalance.results.requirements import AT_LEAST, MET, MISSED, OPEN
 from ringbalance.results.result import Rows, Table
@@ -71,6 +71,7 @@ def design_document(design: Design) -> dict[str, Any]:
         "smaller": None
         if design.smaller is None
         else {"size_m3": design.smaller[0], "fraction": design.smaller[1].document()},
+        "parts": design.space.names(design.point) if judgement else {},
         "changes": plain_settings(design.point) if judgement else {},
         "settings": plain_settings(judgement.settings) if judgement else {},
         "asked": judgement.required_fraction if judgement else None,
@@ -219,9 +220,13 @@ def _keys_table(design: Design, judgement: Judgement) -> Table:
             design.space.range_text(path) if path in design.space.paths else "follows",
         )
         for path, value in design.point.items()
+        if value is not None
     ]
-    if valve := design.space.valve(design.point):
-        rows.insert(0, (VALVE, "", valve, ", ".join(design.space.valves)))
+    parts = design.space.parts
+    rows[:0] = [
+        (part, "", name, ", ".join(parts[part].names))
+        for part, name in design.space.names(design.point).items()
+    ]
     rows += [
         (path, setting_text(path, raw_value_at(design.given, path)), setting_text(path, value), "by runs")
         for path, value in judgement.settings.items()
@@ -233,8 +238,8 @@ def _effects_table(design: Design) -> Table:
     rows = []
     for each in design.effects:
         instead = (
-            design.space.valve({**design.point, **each.changes})
-            if each.path == VALVE
+            design.space.names({**design.point, **each.changes})[each.path]
+            if each.path in design.space.parts
             else setting_text(each.path, each.changes[each.path])
         )
         met = "no such design" if each.met is None else percent(each.met.value, digits=3)
@@ -259,14 +264,13 @@ def _front_table(design: Design) -> Table:
             format_given(each.size, "m^3", digits=4),
             format_given(finite(each.race.judgement.time(required_fraction)), "s", digits=3),
             format_given(finite(each.race.gas), "J", digits=3),
-            *([design.space.valve(each.point)] if design.space.valves else []),
+            *design.space.names(each.point).values(),
             *(setting_text(path, each.point.get(path)) for path in paths),
         )
         for each in design.front
     ]
-    valve = (VALVE,) if design.space.valves else ()
     columns = (path.rpartition(".")[2].replace("_", " ") for path in paths)
-    heads = ("size", f"{percent(required_fraction)} within", "gas, median", *valve, *columns)
+    heads = ("size", f"{percent(required_fraction)} within", "gas, median", *design.space.parts, *columns)
     return Table(
         caption="Others, none of which is better in everything; times and gas of few devices",
         heads=heads,

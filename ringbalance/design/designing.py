@@ -34,8 +34,6 @@ from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.platform.processes import beside
 
-VALVE: Final = "valve"
-"""Path that represents all keys of a valve with a name."""
 _MOVE_FRACTION: Final = 0.05
 """Relative change of a key, up and down, for its effect."""
 _EFFECT_DEVICES: Final = 256
@@ -91,6 +89,8 @@ class Design(PresentedResult):
     doubt: float | None
     """Relative half-width (95 %) of the size by the random choice of devices; None: the fraction of devices
     does not grow with the size, or the size does not vary."""
+    tried: tuple[RacedDesign, ...]
+    """Designs that ran on a block of devices or more, each with its last judgement."""
     front: tuple[RacedDesign, ...]
     """Alternative designs that should meet the requirements, Pareto-optimal in size, time and gas."""
     effects: tuple[Effect, ...]
@@ -196,6 +196,13 @@ def run_design(
         judgement=judgement,
         smaller=smaller,
         doubt=doubt,
+        tried=tuple(
+            {
+                repr(each.point): each
+                for each in (*races.candidates, *judged)
+                if each.race.judgement.meets.size >= DEVICES
+            }.values()
+        ),
         front=() if best is None else _front(races, required_fraction, best),
         effects=effects,
         ranking=ranking,
@@ -219,7 +226,8 @@ def _effects(
             by = (1 - _MOVE_FRACTION, 1 + _MOVE_FRACTION)
             moves += [(path, {path: float(f"{factor * float(point[path]):.4g}")}) for factor in by]
         now = {path: point.get(path) for path in axis.paths}
-        name = VALVE if any(axis.names) else axis.paths[0]
+        parts = [part for part, each in space.parts.items() if each is axis]
+        name = parts[0] if parts else axis.paths[0]
         for choice in () if axis.ranges else axis.choices:
             if any(now[path] != value for path, value in choice.items()):
                 moves.append((name, dict(choice)))

@@ -9,7 +9,7 @@ from typing import Any
 from ringbalance.controller.judging.judge import plain_settings
 from ringbalance.controller.liquid_ring.offers import valves_on_sale
 from ringbalance.design.designing import Design
-from ringbalance.design.space import VALVE_KEYS
+from ringbalance.design.space import VALVE, VALVE_KEYS
 from ringbalance.design.store import Store, key_of
 from ringbalance.reduced_model.residual_liquid import Holding
 from ringbalance.scene.models import Scene
@@ -51,7 +51,7 @@ def keep_design(scene: SceneFile, design: Design) -> None:
     if judgement is None or not trusted(folder):
         return
     answer = {
-        "valve": design.space.valve(design.point),
+        "valve": design.space.names(design.point).get(VALVE, ""),
         "changes": plain_settings({**design.point, **judgement.settings}),
         "fraction": judgement.fraction.document(),
         "verdict": judgement.verdict,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -27,8 +27,13 @@ _DIGITS: Final = 3
 """Significant digits of a tried value, as in a drawing."""
 _HASTY_FACTOR: Final = 2.0
 """Run time over the required settling time: any later settling is too late."""
+VALVE: Final = "valve"
+LIQUID: Final = "liquid"
+"""Names of all keys of a valve or a liquid together."""
 VALVE_KEYS: Final = ("conductance", "critical_ratio", "valve_lag")
 _VALVE: Final = tuple(f"gas.{key}" for key in VALVE_KEYS)
+_LIQUID_KEYS: Final = ("name", "density", "kinematic_viscosity", "vapour_pressure", "temperature")
+_LIQUID: Final = tuple(f"liquid.{key}" for key in _LIQUID_KEYS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +47,7 @@ class Space:
     def of(cls, scene: Scene) -> Space:
         """Make the space of [design]. Raises: SceneError: nothing may vary, or a key cannot be used."""
         keys = scene.design
-        axes = [*_listed(scene), *_valves(scene)]
+        axes = [*_listed(scene), *_valves(scene), *_liquids(scene)]
         taken = {path for axis in axes for path in axis.paths}
         for path, (low, high, log) in _ranges(scene).items():
             if path not in taken:
@@ -50,7 +55,8 @@ class Space:
         if not any((keys.outer_radius, keys.axial_width, keys.pressure, taken)):
             allowed = (
                 "a table [design] with the space (outer_radius, axial_width), the highest pressure, valves, "
-                "valve_file or vary; for a given disc, --in-place, or `ringbalance tune` for its controller"
+                "valve_file, liquids or vary; for a given disc, --in-place, or `ringbalance tune` for its "
+                "controller"
             )
             raise SceneError.of_file(scene.file, "[design] leaves nothing to choose", allowed)
         return cls(scene=scene, axes=tuple(axes))
@@ -86,7 +92,7 @@ class Space:
             # Rounded as in a drawing; the data of a valve are not rounded.
             point = {
                 path: float(f"{value:.{_DIGITS}g}")
-                if isinstance(value, float) and path not in _VALVE
+                if isinstance(value, float) and path not in (*_VALVE, *_LIQUID)
                 else value
                 for part in row
                 for path, value in part.items()
@@ -149,17 +155,17 @@ class Space:
         )
 
     @property
-    def valves(self) -> tuple[str, ...]:
-        """Names of the available valves."""
-        return tuple(name for axis in self.axes for name in axis.names if name)
+    def parts(self) -> dict[str, SweepAxis]:
+        """Axes with named choices, by what they choose: "valve" or "liquid"."""
+        return {
+            LIQUID if axis.paths[0].startswith("liquid.") else VALVE: axis
+            for axis in self.axes
+            if any(axis.names)
+        }
 
-    def valve(self, point: Point) -> str:
-        """Name of a point's valve; empty if valves have no choice or no name."""
-        for axis in self.axes:
-            for name, choice in zip(axis.names, axis.choices, strict=False):
-                if all(point.get(path) == value for path, value in choice.items()):
-                    return name
-        return ""
+    def names(self, point: Point) -> dict[str, str]:
+        """Name of each part of a point, by what it is: its valve, its liquid."""
+        return {part: axis.name_of(point) for part, axis in self.parts.items()}
 
     def wider(self, path: str, *, low: bool) -> str | None:
         """`vary` with a range extended beyond an end, as TOML; None: the scene gives this end."""
@@ -216,6 +222,31 @@ def _valves(scene: Scene) -> tuple[SweepAxis, ...]:
         for valve in (each.completed for each in keys.valves)
     )
     return (SweepAxis(ranges={}, choices=choices, names=tuple(valve.name for valve in keys.valves)),)
+
+
+def _liquids(scene: Scene) -> tuple[SweepAxis, ...]:
+    """One axis with all available liquids; empty if there are none.
+
+    A value that an entry does not state is that of the known liquid, at the scene's temperature.
+    """
+    liquids = scene.design.liquids
+    if not liquids:
+        return ()
+    choices = [
+        {path: getattr(each, key) for path, key in zip(_LIQUID, _LIQUID_KEYS, strict=True)}
+        for each in liquids
+    ]
+    for number, choice in enumerate(choices, 1):
+        if choice["liquid.temperature"] is None:
+            choice["liquid.temperature"] = scene.liquid.temperature
+        try:
+            scene.with_values(choice)
+        except SceneError as error:
+            faults = [
+                replace(each, table="design", key=f"liquids[{number}].{each.key}") for each in error.faults
+            ]
+            raise SceneError(faults) from error
+    return (SweepAxis(ranges={}, choices=tuple(choices), names=tuple(each.name for each in liquids)),)
 
 
 def _placed(scene: Scene, key: str, fault: Fault) -> Fault:

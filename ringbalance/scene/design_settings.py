@@ -3,9 +3,38 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from ringbalance.scene.keys.declaration import Listed, Shown, standard, unused
-from ringbalance.scene.keys.fields import OneLine, PositiveGaugePressure, PositiveLength, each_of, text
+from ringbalance.scene.keys.declaration import Listed, Shown, needed, standard, unused
+from ringbalance.scene.keys.fields import (
+    POSITIVE,
+    AbsolutePressure,
+    OneLine,
+    PositiveGaugePressure,
+    PositiveLength,
+    Temperature,
+    each_of,
+    quantity,
+    text,
+)
 from ringbalance.scene.valves import Valve
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiquidAtHand:
+    """A liquid from which a design chooses; keys as in [liquid]."""
+
+    name: Annotated[OneLine, needed("a known liquid, or a label for one whose data follow")]
+    temperature: Annotated[Temperature | None, unused("that of [liquid]", "of the liquid at work")] = None
+    density: Annotated[
+        float | None, quantity("density", POSITIVE), unused("that of the known liquid", "density")
+    ] = None
+    kinematic_viscosity: Annotated[
+        float | None,
+        quantity("kinematic_viscosity", POSITIVE),
+        unused("that of the known liquid", "kinematic viscosity"),
+    ] = None
+    vapour_pressure: Annotated[
+        AbsolutePressure | None, unused("that of the known liquid; 0 Pa for a custom one", "absolute")
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +75,12 @@ class DesignSettings:
         ),
         Shown("file of valves"),
     ] = None
+    liquids: Annotated[
+        tuple[LiquidAtHand, ...],
+        standard([], "liquids at hand; without any, that of [liquid] stays"),
+        Listed('[{ name = "water" }, { name = "silicone oil 5 cSt", temperature = "25 degC" }, ...]'),
+        Shown("liquids at hand"),
+    ] = ()
     vary: Annotated[
         tuple[str, ...],
         each_of(text(), example='["tube.bore=0.5mm:2mm", "disc.chambers=4,6"]'),

@@ -25,6 +25,7 @@ from ringbalance.controller.judging.search import searched
 from ringbalance.design.races import deal, threshold
 from ringbalance.design.racing import near, settings_at
 from ringbalance.design.space import Space
+from ringbalance.design.static import row_reach, static_rows
 from ringbalance.results.requirements import MET, OPEN, Proportion
 from ringbalance.scene.models import Scene
 
@@ -78,6 +79,38 @@ def test_what_lost_workers_had_to_do_is_done_again() -> None:
         done = pool.submit(int, "7")
     executor = Mock(submit=Mock(side_effect=[done, lost, BrokenProcessPool("ended before")]))
     assert deal(executor, [partial(int, text) for text in ("7", "8", "9")]) == [7, 8, 9]
+
+
+def test_a_denser_liquid_at_hand_is_chosen_and_named() -> None:
+    """One disc, which is too small with water: the moment is proportional to the density."""
+    dense = {"name": "dense", "density": "1.5 g/ml", "kinematic_viscosity": "0.8 mm^2/s"}
+    scene = open_scene(
+        ("disc.axial_width=14mm", WIDTHS[1], "gas.pressure=0.6MPa"),
+        requirement__fraction=0.7,
+        design__liquids=[{"name": "water"}, dense | {"vapour_pressure": "2.3 kPa"}],
+    )
+    space = Space.of(scene)
+    reaches = [
+        row_reach(row) or 0.0
+        for row in static_rows(scene, space.points(np.array([[0.5, 0.5, 0.5, at] for at in (0.25, 0.75)])))
+    ]
+    assert reaches[1] == pytest.approx(1.5 * reaches[0], rel=0.05)
+    design = rb.find_design(scene)
+    assert design.to_dict()["parts"] == {"liquid": "dense"}
+    assert design.succeeded
+    assert design.recommended_scene.liquid.density == 1500.0
+    assert [each.changes["liquid.name"] for each in design.effects if each.path == "liquid"] == ["water"]
+    assert ("liquid", "", "dense", "water, dense") in design.rows().tables[0].rows
+
+
+def test_the_judged_designs_are_drawn_with_the_chosen_one_and_what_is_required(
+    design: rb.Design, tmp_path: Path
+) -> None:
+    design.plot(tmp_path / "design.svg")
+    text = (tmp_path / "design.svg").read_text(encoding="utf-8")
+    words = ("chosen", "required", "met", "not met", "devices that meet all, in %", "in ml", "in MPa")
+    assert [word for word in words if word not in text] == []
+    assert design.point in [each.point for each in design.tried]
 
 
 def test_threads_make_no_difference(design: rb.Design) -> None:
@@ -291,6 +324,8 @@ def test_an_error_in_a_file_of_valves_names_its_cell(tmp_path: Path) -> None:
         ('outer_radius = "20 mm"', "no chamber has room there"),
         ('valve_file = "none.csv"', 'valve_file = "none.csv": there is no such file'),
         ('valves = "valves.csv"', 'or valve_file = "valves.csv" in place of the list'),
+        ('liquids = [{ name = "watr" }]', r'liquids\[1\]\.name = "watr": no liquid of that name .*"water"'),
+        ('liquids = [{ name = "water" }, { name = "gallium" }]', r'liquids\[2\]\.temperature = "20 degC"'),
         ("", "leaves nothing to choose"),
     ],
 )

@@ -27,13 +27,13 @@ def test_the_size_stays_and_all_else_that_can_be_changed_is_open(paper_scene: Sc
     for radius, holds in ((crest.high, True), (crest.high + 1e-4, False)):
         changed = paper_scene.with_values({"tube.hump_radius": radius, "tube.length": "80 mm"})
         assert Holding.of(changed, fill_ratio=changed.disc.max_fill_ratio).holds is holds
-    assert len(space.valves) == 3
-    assert "as in the scene" not in space.valves
+    assert len(space.parts["valve"].names) == 3
+    assert "as in the scene" not in space.parts["valve"].names
 
 
 def test_what_the_scene_states_stays(paper_scene: Scene) -> None:
     valve = {"gas.conductance": "1 l/(s*bar)", "gas.critical_ratio": 0.3, "gas.valve_lag": "5 ms"}
-    assert Space.of(within_disc(paper_scene.with_values(valve))).valves[0] == "as in the scene"
+    assert Space.of(within_disc(paper_scene.with_values(valve))).parts["valve"].names[0] == "as in the scene"
     stated = {
         "design.outer_radius": "60 mm",
         "design.pressure": "0.9 MPa",
@@ -44,7 +44,7 @@ def test_what_the_scene_states_stays(paper_scene: Scene) -> None:
     assert set(space.paths) == {
         *("tube.bore", "gas.pressure", "gas.conductance", "gas.critical_ratio", "gas.valve_lag")
     }
-    assert space.valves == ("V",)
+    assert space.parts["valve"].names == ("V",)
     (pressure,) = (axis.ranges["gas.pressure"] for axis in space.axes if "gas.pressure" in axis.paths)
     assert pressure.high == 0.9e6
 

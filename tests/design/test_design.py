@@ -28,6 +28,7 @@ from ringbalance.design.space import Space
 from ringbalance.design.static import row_reach, static_rows
 from ringbalance.results.requirements import MET, OPEN, Proportion
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 
 WIDTHS = ("disc.axial_width=14mm,26mm,38mm", "tube.bore=0.9mm", "gas.pressure=0.4MPa")
 
@@ -98,7 +99,7 @@ def test_a_denser_liquid_at_hand_is_chosen_and_named() -> None:
     design = rb.find_design(scene)
     assert design.to_dict()["parts"] == {"liquid": "dense"}
     assert design.succeeded
-    assert design.recommended_scene.liquid.density == 1500.0
+    assert liquid_ring_scene(design.recommended_scene).liquid.density == 1500.0
     assert [each.changes["liquid.name"] for each in design.effects if each.path == "liquid"] == ["water"]
     assert ("liquid", "", "dense", "water, dense") in design.rows().tables[0].rows
 

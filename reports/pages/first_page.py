@@ -96,7 +96,7 @@ _WITHOUT_GROUND: Final[Record] = {"facecolor": "none", "edgecolor": MUTED, "line
 def _tuning(work: Work) -> Record:
     """Settings found by runs, with the scene under the recommended ones as `scene`."""
     scene, balancer = work.ring, LiquidRingBalancer(work.ring)
-    tuning = tuned(balancer, scan=True, remedies=True)
+    tuning = tuned(balancer, curve=True, remedies=True)
     chosen = liquid_ring_scene(tuning.scene)
     recommended_run = None
     if tuning.recommended.settings:

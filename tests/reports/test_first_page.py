@@ -236,3 +236,18 @@ def test_a_symbol_at_the_head_of_a_caption_stays_as_it_is() -> None:
     assert opening("k against the velocity") == "k against the velocity"
     assert opening("a tube") == "A tube"
     assert opening("loss") == "Loss"
+
+
+def test_a_fraction_is_never_said_instead_of_itself(evidence: Record, said: Said) -> None:
+    """Equal in print: as many devices, and the times decide; else both fractions."""
+    changed = recommended(evidence)
+    own, best = changed["summary"]["own"], changed["summary"]["recommended"]
+    assert "100 % of devices settle instead of 84 %" in said(changed, "summary")
+    own["fraction"] = best["fraction"]
+    best["settling_time_s"] = {"p50": 1.0, "p90": 2.0}
+    own["settling_time_s"] = {"p50": 1.0, "p90": 3.0}
+    page = said(changed, "summary")
+    assert "instead of 100 %" not in page
+    assert "nine tenths within 2.0 s; as many, but later, with the scene’s own." in page
+    own["settling_time_s"] = best["settling_time_s"]
+    assert "but later" not in said(changed, "summary")

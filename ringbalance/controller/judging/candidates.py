@@ -10,7 +10,7 @@ from typing import Final
 from ringbalance.controller.balancer import Outcomes, Settings
 from ringbalance.controller.judging.judge import Judgement
 from ringbalance.controller.trials import Trials
-from ringbalance.results.requirements import Paired
+from ringbalance.results.requirements import MET, MISSED, OPEN, Paired
 from ringbalance.scene.arrays import BoolArray
 
 DEVICES: Final = 32
@@ -23,6 +23,9 @@ _AS_FAST: Final = 1.3
 """Ratio of settling times up to which two settings count as equally fast."""
 _SETTLED: Final = 0.9
 """Fraction of the served devices whose settling time decides between settings that serve as many."""
+_CHANCE: Final = 0.05
+"""Significance level of the paired test by which settings replace others that meet what is required."""
+_WORST_FIRST: Final = (MISSED, OPEN, MET)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,6 +125,24 @@ def chosen(tried: Iterable[Tried]) -> Tried | None:
             -each.judgement.time(share),
         ),
     )
+
+
+def supersedes(judgement: Judgement, kept: Judgement) -> bool:
+    """True if settings replace those that stand unless others are better, both judged on the same devices.
+
+    They must have the better verdict; else serve more devices, beyond chance where the others meet what is
+    required, or there no fewer, `_AS_FAST` times as fast.
+    """
+    ranks = [_WORST_FIRST.index(each.verdict) for each in (judgement, kept)]
+    if ranks[0] != ranks[1]:
+        return ranks[0] > ranks[1]
+    # An undecided verdict has run on more devices.
+    count = min(judgement.meets.size, kept.meets.size)
+    pairs = Paired.of(judgement.meets[:count], kept.meets[:count])
+    more, share = pairs.first_alone - pairs.second_alone, _SETTLED * kept.fraction.value
+    if kept.verdict != MET:
+        return more > 0
+    return pairs.better(_CHANCE) == 0 or (more >= 0 and _AS_FAST * judgement.time(share) < kept.time(share))
 
 
 def is_worse(each: Tried, best: BoolArray) -> bool:

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Final
 
 from ringbalance.controller.balancer import Balancer, Settings
-from ringbalance.controller.judging.candidates import Tried
+from ringbalance.controller.judging.candidates import Tried, supersedes
 from ringbalance.controller.judging.holding import endurance
 from ringbalance.controller.judging.judge import Judgement, best_of, judged_all
 from ringbalance.controller.judging.ranking import ranked
@@ -36,6 +36,7 @@ def tuned(
     balancer: Balancer,
     *,
     scan: bool = False,
+    curve: bool = False,
     remedies: bool = False,
     choices: bool = False,
     progress: Progress | None = None,
@@ -44,6 +45,8 @@ def tuned(
 
     Args: `scan`: scan the axis `Trials.scan_axis`, such as the supply's pressure, in any case; otherwise only
             where the scene's own level does not meet what is required.
+        `curve`: judge the levels of that axis in any case; where the scene's own level meets what is required
+            they decide nothing.
         `remedies`: try remedies where the requirement is not met. `choices`: judge parts that can be bought
             where the scene leaves the choice open.
     """
@@ -59,14 +62,20 @@ def tuned(
     fresh = stated if chosen in stated else [*stated, chosen]
     judgements = judged_all(balancer, fresh, progress=report)
     unchanged, best = judgements[0] if states_own else None, judgements[-1]
+    if unchanged is not None and not supersedes(best, unchanged):
+        best = unchanged
 
     levels: tuple[ScanLevel, ...] = ()
-    if winners and (scan or best.verdict != MET):
-        curve = scanned(balancer, spaces, winners, progress=report)
-        levels, winners_there = (curve.levels, curve.searched) if curve else ((), ())
-        chosen = best_of(balancer, [best.settings, *_worth_judging(winners_there)], progress=report)
+    move = scan or best.verdict != MET
+    if winners and (curve or move):
+        result = scanned(balancer, spaces, winners, progress=report)
+        levels, winners_there = (result.levels, result.searched) if result else ((), ())
+        there = _worth_judging(winners_there) if move else []
+        chosen = best_of(balancer, [best.settings, *there], progress=report)
         if chosen != best.settings:
-            (best,), winners = judged_all(balancer, [chosen], progress=report), winners_there
+            (moved,) = judged_all(balancer, [chosen], progress=report)
+            if supersedes(moved, best):
+                best, winners = moved, winners_there
 
     # Where no device meets the demands, a longer watch time changes nothing.
     longer: Judgement | None = None

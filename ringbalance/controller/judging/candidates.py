@@ -127,22 +127,24 @@ def chosen(tried: Iterable[Tried]) -> Tried | None:
     )
 
 
-def supersedes(judgement: Judgement, kept: Judgement) -> bool:
+def supersedes(judgement: Judgement, incumbent: Judgement) -> bool:
     """True if settings replace those that stand unless others are better, both judged on the same devices.
 
     They must have the better verdict; else serve more devices, beyond chance where the others meet what is
     required, or there no fewer, `_AS_FAST` times as fast.
     """
-    ranks = [_WORST_FIRST.index(each.verdict) for each in (judgement, kept)]
+    ranks = [_WORST_FIRST.index(each.verdict) for each in (judgement, incumbent)]
     if ranks[0] != ranks[1]:
         return ranks[0] > ranks[1]
     # An undecided verdict has run on more devices.
-    count = min(judgement.meets.size, kept.meets.size)
-    pairs = Paired.of(judgement.meets[:count], kept.meets[:count])
-    more, share = pairs.first_alone - pairs.second_alone, _SETTLED * kept.fraction.value
-    if kept.verdict != MET:
+    count = min(judgement.meets.size, incumbent.meets.size)
+    pairs = Paired.of(judgement.meets[:count], incumbent.meets[:count])
+    more, share = pairs.first_alone - pairs.second_alone, _SETTLED * incumbent.fraction.value
+    if incumbent.verdict != MET:
         return more > 0
-    return pairs.better(_CHANCE) == 0 or (more >= 0 and _AS_FAST * judgement.time(share) < kept.time(share))
+    return pairs.better(_CHANCE) == 0 or (
+        more >= 0 and _AS_FAST * judgement.time(share) < incumbent.time(share)
+    )
 
 
 def is_worse(each: Tried, best: BoolArray) -> bool:

@@ -164,7 +164,7 @@ def tried_remedies(
         replace(
             row,
             judgement=_judgement(
-                _changed(balancer, _merged(row.remedies)), row.judgement.settings, FIRST_VERDICT_DEVICE
+                with_changes(balancer, _merged(row.remedies)), row.judgement.settings, FIRST_VERDICT_DEVICE
             ),
         )
         if row.met or row is rows[0]
@@ -188,7 +188,7 @@ def tried_choices(
     """
 
     def search(changed: Balancer) -> Settings:
-        return {**settings, **coarse_settings(_changed(changed, settings))}
+        return {**settings, **coarse_settings(with_changes(changed, settings))}
 
     judge = partial(_judge, balancer, search=search, scan_path=scan_path, progress=progress)
     rows = (judge([choice], start=FIRST_VERDICT_DEVICE) for choice in balancer.choices()[some])
@@ -245,7 +245,7 @@ def _judge(
     """
     changes = _merged(remedies)
     try:
-        changed = _changed(balancer, changes)
+        changed = with_changes(balancer, changes)
         if progress is not None:
             progress(f"trying {', '.join(remedy.name or remedy.code for remedy in remedies)}")
         judgement = _judgement(changed, search(changed), start)
@@ -261,7 +261,7 @@ def _judge(
     return Remedied(remedies=tuple(remedies), judgement=judgement, size=size, scan_path=scan_path)
 
 
-def _changed(balancer: Balancer, changes: Settings) -> Balancer:
+def with_changes(balancer: Balancer, changes: Settings) -> Balancer:
     """The balancer on its scene with changes. Raises: SceneError: these are refused."""
     return balancer.on_scene(rechecked(balancer.scene).with_values(changes, origin="inferred"))
 

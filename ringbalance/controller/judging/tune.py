@@ -12,7 +12,7 @@ from ringbalance.controller.judging.candidates import Tried, supersedes
 from ringbalance.controller.judging.holding import endurance
 from ringbalance.controller.judging.judge import Judgement, best_of, judged_all
 from ringbalance.controller.judging.ranking import ranked
-from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
+from ringbalance.controller.judging.remedies import tried_choices, tried_remedies, with_changes
 from ringbalance.controller.judging.search import (
     Progress,
     ScanLevel,
@@ -70,8 +70,8 @@ def tuned(
     if winners and (curve or move):
         result = scanned(balancer, spaces, winners, progress=report)
         levels, winners_there = (result.levels, result.searched) if result else ((), ())
-        there = _worth_judging(winners_there) if move else []
-        chosen = best_of(balancer, [best.settings, *there], progress=report)
+        proposed = _worth_judging(winners_there) if move else []
+        chosen = best_of(balancer, [best.settings, *proposed], progress=report)
         if chosen != best.settings:
             (moved,) = judged_all(balancer, [chosen], progress=report)
             if supersedes(moved, best):
@@ -98,7 +98,7 @@ def tuned(
     final_level = value_at(balancer.scene, axis.name) if axis and level is None else level
     mend = remedies and best.verdict != MET
     find = partial(searched, level=level)
-    return Tuning(
+    tuning = Tuning(
         given=balancer.scene,
         recommended=best,
         own=unchanged,
@@ -108,7 +108,6 @@ def tuned(
         along=tuple(replace(each, judgement=best) if each.level == final_level else each for each in levels),
         along_name=axis_name,
         along_unit=axis.unit if axis else "1",
-        information=balancer.information(with_values_at(balancer.scene, best.settings)),
         rotor=_rotor(balancer),
         capacity=capacity,
         ranking=ranked(balancer, best),
@@ -121,7 +120,14 @@ def tuned(
             else ()
         ),
         open_choice=bool(balancer.choices()),
-        endurance=endurance(balancer, best, report),
+    )
+    # With the settings that are recommended, those of a part that can be bought where one suffices.
+    part = tuning.best_choice
+    mounted = with_changes(balancer, part.changes) if part and part.met else balancer
+    return replace(
+        tuning,
+        information=balancer.information(tuning.scene),
+        endurance=endurance(mounted, tuning.judgement if part and part.met else best, report),
     )
 
 

@@ -131,7 +131,7 @@ class Tuning(Result):
             "further_s": WATCH_TIME_S,
             "longer": self.longer
             and {"further_s": LONG_WATCH_TIME_S, "fraction": self.longer.fraction.document()},
-            "required": best.demands_document(),
+            "required": self.judgement.demands_document(),
             "along": {
                 "path": self.along_name,
                 "unit": self.along_unit,
@@ -166,7 +166,7 @@ class Tuning(Result):
 
     def rows(self) -> Rows:
         """The result as quantities, findings and tables."""
-        scene, best = self.given, self.recommended
+        scene = self.given
         settings = []
         for path, value in self.changes.items():
             before = setting_text(path, raw_value_at(scene, path))
@@ -191,7 +191,7 @@ class Tuning(Result):
             facts=self.information.facts,
             tables=(
                 Table(caption="Settings", heads=("key", "the scene's", "recommended"), rows=settings),
-                required_table(best),
+                required_table(self.judgement),
                 Table(
                     caption=f"Over {self.along_name}",
                     heads=(self.along_name, *_FRACTION_AND_TIMES, "usable moment"),
@@ -209,6 +209,7 @@ class Tuning(Result):
         )
 
     def _quantities(self) -> Iterator[Quantity]:
+        ideal = "with an ideal valve, " if self.choices else ""
         for key, name, judgement in (
             ("fraction_met", "devices that meet what is required", self.judgement),
             (
@@ -216,13 +217,13 @@ class Tuning(Result):
                 "the same with an ideal valve",
                 self.recommended if self.choices else None,
             ),
-            ("fraction_met_own", "the same with the scene's own settings", self.own),
-            ("fraction_met_longer", "the same, watched longer", self.longer),
+            ("fraction_met_own", f"the same {ideal}with the scene's own settings", self.own),
+            ("fraction_met_longer", f"the same, {ideal}watched longer", self.longer),
         ):
             if judgement is not None:
                 yield Quantity.of_fraction(judgement.fraction, key=key, name=name)
-        yield from reported_quantities(self.recommended)
-        times = self.recommended.settling_times
+        yield from reported_quantities(self.judgement)
+        times = self.judgement.settling_times
         for part, name in (("p50", "half of them settle within"), ("p90", "nine tenths settle within")):
             yield Quantity(
                 key=f"settling_time_{part}",
@@ -271,7 +272,8 @@ class Tuning(Result):
         values = {**best.sentence_values, "part": " and an ideal valve" if self.open_choice else ""}
         yield Finding(code=code, values=values, change=changes)
         times = best.settling_times
-        if times["p50"] is not None:
+        # With parts that can be bought the times are among the quantities, of the part.
+        if times["p50"] is not None and not self.choices:
             code = "tuned_half" if times["p90"] is None else "tuned_times"
             yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
         yield from reported_findings(best)

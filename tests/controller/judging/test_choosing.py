@@ -24,6 +24,7 @@ from ringbalance.controller.liquid_ring.offers import trials
 from ringbalance.controller.rotor import CommonRotor
 from ringbalance.controller.trials import DrawnInput, Information, SearchAxis, Trials
 from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.results.rows import Quantity
 from ringbalance.scene.draws import quantiles
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import SceneFile
@@ -312,3 +313,37 @@ def test_the_scenes_settings_stay_unless_others_are_better_beyond_chance(
     for again in (tuned(machine, curve=True), tuned(machine, scan=True)):
         assert again.along
         assert again.recommended.settings == result.recommended.settings
+
+
+@dataclass(frozen=True, eq=False)
+class Bought(Machine):
+    """A valve that can be bought settles devices in half a second, where an ideal one takes a second."""
+
+    def choices(self) -> tuple[Remedy, ...]:
+        changes = {"gas.conductance": 1e-8, "gas.critical_ratio": 0.3, "gas.valve_lag": 1e-3}
+        return (Remedy(code="valve", name="Bought", changes=changes),)
+
+    def on_scene(self, scene: SceneFile) -> Machine:
+        return Bought(cast("Scene", scene), self.ran, needs=self.needs)
+
+    def information(self, scene: SceneFile) -> Information:
+        gas = cast("Scene", scene).gas
+        key, name = "of", "conductance"
+        return Information(quantities=(Quantity(key=key, name=name, unit="1", value=gas.conductance or 0.0),))
+
+    def _outcomes(self, settings: Mapping[str, Any], draws: Draws) -> Outcomes:
+        outcomes = super()._outcomes(settings, draws)
+        time = 1.0 if self.scene.gas.conductance is None else 0.5
+        return replace(outcomes, settling_time=time * outcomes.settling_time)
+
+
+def test_every_number_beside_settings_is_that_of_these_settings(paper_scene: Scene) -> None:
+    """Margins, times and requirements are those of the valve whose settings are recommended."""
+    machine = cast("Any", Bought(at(paper_scene, 0.56), needs=1.0))
+    ideal, bought = tuned(machine), tuned(machine, choices=True)
+    assert bought.changes["gas.conductance"] == 1e-8
+    for result, conductance, time in ((ideal, 0.0, 1.0), (bought, 1e-8, 0.5)):
+        values = {each.key: each.value for each in result.rows().quantities}
+        assert values["of"] == conductance
+        assert values["settling_time_p90"] == result.to_dict()["settling_time_s"]["p90"] == time
+    assert "tuned_times" not in {each.code for each in bought.rows().findings}

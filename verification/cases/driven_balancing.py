@@ -361,12 +361,12 @@ def _estimate_imbalance(
     """States, shape (n, 6), and covariances, shape (n, 6, 6), of the scene's filter over a record."""
     keys = scene.imbalance_filter
     settings = filter_settings(scene)._replace(step=scene.sensor.step, laboratory=False)
-    masses = PlantParameters.of(scene).moment * np.sum(np.exp(1j * np.array(scene.masses.initial_angle)))
+    masses = PlantParameters.of(scene).mass_vector(scene.masses.initial_angle)
     return imbalance_history(
         imbalance_filter(settings, speeds=record.speed),
         samples=record.samples,
         variance=scale**2 * np.repeat([keys.position_noise**2, keys.velocity_noise**2], 2),
-        masses=locked_masses(complex(masses)),
+        masses=locked_masses(masses),
     )
 
 

@@ -104,12 +104,14 @@ class PlantParameters(NamedTuple):
     def steady_whirl(self, speed: float, angles: Sequence[float]) -> complex:
         """Displacement x + j y in the rotor's frame at constant speed, masses at rest on the track, m.
 
-        z = alpha (U exp(j phi_m) + b sum exp(j phi_i)); its magnitude is the zero-to-peak vibration.
+        z = alpha (U exp(j phi_m) + p), see `mass_vector`; its magnitude is the zero-to-peak vibration.
         Raises: ValueError: no damping, at the critical speed.
         """
-        masses = sum(cmath.exp(1j * angle) for angle in angles)
-        moment = self.unbalance * cmath.exp(1j * self.phase) + self.moment * masses
-        return self.influence(speed) * moment
+        return self.influence(speed) * (cmath.rect(self.unbalance, self.phase) + self.mass_vector(angles))
+
+    def mass_vector(self, angles: Sequence[float]) -> complex:
+        """Static moment of the masses in the rotor's frame, p = b sum exp(j phi_i), kg m."""
+        return sum((cmath.rect(self.moment, angle) for angle in angles), 0j)
 
     @classmethod
     def of(cls, scene: EccentricScene) -> PlantParameters:
@@ -146,8 +148,8 @@ def rotor_record(scene: EccentricScene) -> dict[str, float | None]:
     """Critical speed, rad/s, amplification factor, and phase of the resultant of unbalance and masses at
     their initial angles, rad in the rotor's frame; plain numbers.
     """
-    plant, angles = PlantParameters.of(scene), scene.masses.initial_angle
-    left = cmath.rect(plant.unbalance, plant.phase) + sum(cmath.rect(plant.moment, each) for each in angles)
+    plant = PlantParameters.of(scene)
+    left = cmath.rect(plant.unbalance, plant.phase) + plant.mass_vector(scene.masses.initial_angle)
     constants = {"mass": plant.mass, "stiffness": plant.stiffness}
     return {
         "critical_speed_rad_s": critical_speed(**constants),

@@ -9,8 +9,6 @@ estimate counts.
 
 from __future__ import annotations
 
-import cmath
-
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.imbalance_filter import (
@@ -20,6 +18,7 @@ from ringbalance.controller.eccentric_mass.imbalance_filter import (
     locked_masses,
     whirl_transition,
 )
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import filter_settings, off_by_one
 from ringbalance.scene.arrays import FloatArray
@@ -46,12 +45,13 @@ def rotor_covariance(
     settings = filter_settings(scene)._replace(step=step, euler=False)
     constants, assumed = imbalance_filter(settings, speeds=speed), scene.imbalance_filter
     variance = np.repeat([assumed.position_noise**2, assumed.velocity_noise**2], 2) * (assumed.step / step)
-    masses = locked_masses(_initial_vector(scene))
+    masses = locked_masses(PlantParameters.of(scene).mass_vector(scene.masses.initial_angle))
 
     def estimated(plant: EccentricScene) -> FloatArray:
         """Imbalance that the filter estimates on this rotor, started from rest, kg m along both axes."""
-        rotor, drive = plant.rotor, imbalance + _initial_vector(plant)
-        model = WhirlModel(rotor.mass + 2 * plant.masses.mass, rotor.damping, rotor.stiffness)
+        true = PlantParameters.of(plant)
+        model = WhirlModel(true.mass, true.damping, true.stiffness)
+        drive = imbalance + true.mass_vector(plant.masses.initial_angle)
         state = np.array([0.0, 0.0, 0.0, 0.0, drive.real, drive.imag])
         if begin > 0:
             state = whirl_transition(model, speed, begin) @ state
@@ -68,9 +68,3 @@ def rotor_covariance(
         change = estimated(plant) - nominal
         covariance += np.outer(change, change)
     return covariance
-
-
-def _initial_vector(scene: EccentricScene) -> complex:
-    """p = b sum exp(j phi_i) of the masses at their initial angles, kg m."""
-    moment = scene.masses.mass * scene.masses.guide_radius
-    return moment * sum(cmath.exp(1j * angle) for angle in scene.masses.initial_angle)

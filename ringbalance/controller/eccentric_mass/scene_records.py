@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Annotated, ClassVar, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
 
@@ -48,7 +48,6 @@ from ringbalance.scene.keys.schema import ORIGIN, Schema, TableSchema
 from ringbalance.scene.kinds import (
     Check,
     Contradiction,
-    Rule,
     SceneKind,
     check,
     limit_above_noise,
@@ -341,31 +340,24 @@ def _moves_in_order(stop: float, step: float) -> Contradiction | None:
     )
 
 
-def _widths_below(names: tuple[str, ...]) -> Rule:
-    """Rule: no stated uncertainty exceeds its quantity; its arguments are all widths, then all values."""
-
-    def below(
-        widths: Mapping[str, tuple[float, bool]], *values: float | tuple[float, float]
-    ) -> Contradiction | None:
-        for name, value in zip(names, values, strict=True):
-            width, relative = widths.get(name, (0.0, True))
-            if not relative and width > min(value if isinstance(value, tuple) else (value,)):
-                return Contradiction(
-                    problem=f"the uncertainty of {name} is larger than {name} itself",
-                    allowed="at most the quantity itself, or below 100 %",
-                )
-        return None
-
-    return below
-
-
 def _width_checks() -> Iterator[Check]:
-    """Yield a rule for each table; angles are exempt from it."""
+    """Yield a rule for each table: no stated uncertainty exceeds its quantity; angles are exempt from it."""
     for table, key in ECCENTRIC_MASS.tables["uncertainty"].keys.items():
-        if table != ORIGIN and isinstance(key.takes, Entries):
-            names = tuple(name for name in key.takes.keys if name != "phase")
-            paths = (f"{table}.{name}" for name in names)
-            yield check(_widths_below(names), f"uncertainty.{table}", *paths)
+        if table == ORIGIN or not isinstance(key.takes, Entries):
+            continue
+        names = tuple(name for name in key.takes.keys if name != "phase")
+
+        def below(widths: Mapping[str, tuple[float, bool]], *values: Any, names: Any = names) -> Any:
+            for name, value in zip(names, values, strict=True):
+                width, relative = widths.get(name, (0.0, True))
+                if not relative and width > np.min(value):
+                    return Contradiction(
+                        problem=f"the uncertainty of {name} is larger than {name} itself",
+                        allowed="at most the quantity itself, or below 100 %",
+                    )
+            return None
+
+        yield check(below, f"uncertainty.{table}", *(f"{table}.{name}" for name in names))
 
 
 _ARC, _GUIDE = "masses.arc_length", "masses.guide_radius"

@@ -15,11 +15,17 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import AS_GIVEN, Draws, balancer_of
-from ringbalance.controller.eccentric_mass.plant import rotor_record
+from ringbalance.controller.eccentric_mass.plant import PlantParameters, rotor_record
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_rows import amplitude_band
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, loops_document
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
+from ringbalance.controller.eccentric_mass.static_answers import (
+    largest_whirl_per_imbalance,
+    starting_speed,
+    static_quantities,
+    whirl_per_imbalance,
+)
 from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE
 from ringbalance.controller.loop import simulate
 from ringbalance.physics.evaporation import exhaust_cold
@@ -34,6 +40,7 @@ from ringbalance.reports.section import Record, Work, ring_of
 from ringbalance.reports.sections import sections_of
 from ringbalance.results.numbers import format_given, short, with_unit
 from ringbalance.scene import AnyScene, Scene, scene_table
+from ringbalance.scene.arrays import finite
 from ringbalance.scene.keys.declaration import Entries, keys_of
 from ringbalance.scene.keys.fields import ValueReader
 from ringbalance.scene.kinds import scene_kind
@@ -51,9 +58,10 @@ from ringbalance.verification.runner import case_jobs, paper_scene
 Progress = Callable[[str], None]
 
 FORMAT: Final = 1
-_BAND_DEVICES: Final = 16
-"""Number of drawn devices, the first of the verdict's, whose vibration makes a band."""
+_BAND_DEVICES: Final = 64
+"""Number of drawn devices, those of the verdict, whose vibration makes a band."""
 _LAW_FILLS: Final = 51
+_RUN_UP_SPEEDS: Final = 1001
 
 
 def collect_evidence(
@@ -206,7 +214,11 @@ def _plain_study(scene: SceneFile) -> Record:
 def _eccentric_study(scene: EccentricScene) -> Record:
     """The run, balanced and with its masses locked, drawn devices, loops, and the true values."""
     run, balancer = simulate_eccentric(scene), balancer_of(scene)
-    several = balancer.run({}, Draws.block(FIRST_VERDICT_DEVICE, _BAND_DEVICES), trace=True)
+    # One at a time: a trace has every sample.
+    devices = (
+        balancer.run({}, Draws.block(FIRST_VERDICT_DEVICE + number, 1), trace=True).traced[0]
+        for number in range(_BAND_DEVICES)
+    )
     truth = {
         "unbalance_kg_m": scene.imbalance.mass * scene.imbalance.radius,
         "phase_rad": scene.imbalance.phase,
@@ -218,7 +230,27 @@ def _eccentric_study(scene: EccentricScene) -> Record:
         "locked": locked_run(scene).to_dict(),
         "rotor": rotor_record(scene),
         "tuning": loops_document(RecommendedGains.of(scene)),
-        "drawn": amplitude_band(several.traced, end=scene.run.time_limit),
+        "drawn": amplitude_band(devices, end=scene.run.time_limit),
+        "known": [each.document() for each in static_quantities(scene)],
+        "run_up": _run_up_record(scene),
+    }
+
+
+def _run_up_record(scene: EccentricScene) -> Record | None:
+    """Speed up to which locked masses keep the limit, rad/s, and the limit at the speed of balancing, m, that
+    keeps the scene's over the whole profile, by |alpha| of steady states; None: a constant speed."""
+    speeds, start = scene.rotor.profile[1], starting_speed(scene)
+    if np.ptp(speeds) == 0 or start <= 0:
+        return None
+    plant, limit = PlantParameters.of(scene), scene.supervisor.limit
+    grid = np.linspace(0.0, float(np.max(speeds)), _RUN_UP_SPEEDS)[1:]
+    locked = [abs(plant.steady_whirl(speed, scene.masses.initial_angle)) for speed in grid]
+    above = np.flatnonzero(np.array(locked) > limit)
+    largest = largest_whirl_per_imbalance(scene, after=scene.supervisor.start)
+    return {
+        "start_rad_s": start,
+        "locked_limit_speed_rad_s": float(grid[max(above[0] - 1, 0)]) if above.size else None,
+        "limit_at_start_m": finite(limit * whirl_per_imbalance(scene, start) / largest),
     }
 
 

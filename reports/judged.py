@@ -15,6 +15,7 @@ from ringbalance.reports.prose import key_words, opening
 from ringbalance.reports.section import Record
 from ringbalance.results.requirements import MET, Proportion
 from ringbalance.results.rows import Finding
+from ringbalance.scene.arrays import finite
 from ringbalance.scene.describe import setting_text, usual_unit
 from ringbalance.scene.draws import BLOCK
 from ringbalance.scene.origins import SceneFile, raw_value_at, value_at
@@ -22,6 +23,7 @@ from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import shortest, shortest_quantity
 
 _MAX_CURVE_POINTS: Final = 50
+_MAX_DOMINANT: Final = 3
 _LIMIT: Final = "controller.limit"
 _LIMIT_DIGITS: Final = 3
 _ROUNDING: Final = 1e-9
@@ -85,6 +87,10 @@ def judgement_record(judgement: Judgement) -> Record:
         "asked": judgement.required_fraction,
         "required": required,
         "further_s": WATCH_TIME_S,
+        "energy_J": {
+            f"p{percent}": finite(float(np.quantile(judgement.outcomes.energy, percent / 100)))
+            for percent in (50, 90)
+        },
         "settled": settled_record(judgement.outcomes),
     }
 
@@ -103,7 +109,7 @@ def settled_record(outcomes: Outcomes) -> Record:
 
 
 def advice_view(record: Record) -> Record:
-    """Remedies and measurements as text."""
+    """Remedies and measurements as text; indices of the inputs that decide most between devices."""
     remedies = []
     for remedy in record.get("remedies", ()):
         changes = [
@@ -111,7 +117,12 @@ def advice_view(record: Record) -> Record:
         ]
         # A filter may have its own key for a property of the sensor: its words are those of the sensor's key.
         remedies.append(opening(", ".join(dict.fromkeys(changes))))
-    return {"remedies": remedies, "measures": [each["text"] for each in record.get("measures", ())]}
+    ranking = record.get("ranking", ())[:_MAX_DOMINANT]
+    return {
+        "remedies": remedies,
+        "measures": [each["text"] for each in record.get("measures", ())],
+        "dominant": [i for i, each in enumerate(ranking) if each["index"] > each["noise"]],
+    }
 
 
 def settings_lines(scene: SceneFile, paths: Iterable[str]) -> list[Record]:

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike
 
 from ringbalance.reports.figure import (
@@ -24,12 +25,15 @@ from ringbalance.reports.figure import (
     amplitudes,
     curve,
     draw,
+    figure_of,
     level,
     note,
+    panels,
+    plain_number,
     upright,
 )
 from ringbalance.reports.section import Record
-from ringbalance.results.numbers import number, shown
+from ringbalance.results.numbers import display_unit, number, shown
 from ringbalance.scene.arrays import FloatArray
 
 BAND_SIGMAS: Final = 2.0
@@ -37,8 +41,8 @@ BAND_SIGMAS: Final = 2.0
 _COLOURS: Final = (FOUND, THIRD)
 _LOCKED: Final = {**AS_PAPER, "linewidth": 1.2, "label": "masses locked"}
 _BALANCED: Final = {"color": FOUND, "linewidth": 1.2, "label": "balanced"}
-_STAGE_NAME_WIDTH: Final = 0.09
-"""Fraction of the time axis that the name of a stage needs."""
+_STAGE_NUMBER_WIDTH: Final = 0.012
+"""Fraction of the time axis that the number of a stage needs."""
 _NARROW_HEIGHT_IN: Final = 2.4
 _MAX_LAG_DEG: Final = 300
 """Angle above which a lag is shown as a lead."""
@@ -46,7 +50,8 @@ _ACROSS: Final = ("data", "axes fraction")
 
 
 def over_time(run: Record, locked: Record, devices: Record | None = None) -> Drawing:
-    """Vibration amplitude over time, m, balanced and with the masses locked, with the limit.
+    """Vibration amplitude over time, balanced and with the masses locked, with the limit: while the strategy
+    works, its stages numbered, and over the whole run.
 
     Args: `devices`: band of drawn devices, `time_s`, `low_m` and `high_m`.
     """
@@ -54,28 +59,30 @@ def over_time(run: Record, locked: Record, devices: Record | None = None) -> Dra
         (each["time_s"], each["amplitude_m"], look) for each, look in ((locked, _LOCKED), (run, _BALANCED))
     ]
 
-    def stages(axes: Axes) -> None:
-        span = run["time_s"][-1] - run["time_s"][0]
-        for index, stage in enumerate(run["stages"]):
-            start, end = stage["start_s"], stage["end_s"]
-            if index % 2 == 0:
-                axes.axvspan(start, end, color=MUTED, alpha=0.12, linewidth=0)
-            if end - start > _STAGE_NAME_WIDTH * span:
-                name = stage["name"].replace("_", " ")
-                note(name, (start, 1), (3, -3), xycoords=_ACROSS, va="top")(axes)
+    band = [] if devices is None else [_band(devices["time_s"], devices["low_m"], devices["high_m"])]
 
-    return draw(
-        "eccentric-amplitude",
-        *([] if devices is None else [_band(devices["time_s"], devices["low_m"], devices["high_m"])]),
-        amplitudes(curves, run["limit_m"]),
-        stages,
-        x=TIME,
-        y=AMPLITUDE,
-        xlim=(run["time_s"][0], run["time_s"][-1]),
-        columns=4,
-        wide=True,
-        height=3.2,
-    )
+    unit = display_unit("m", *run["amplitude_m"], run["limit_m"])
+
+    def paint(axes: Axes) -> None:
+        early, all_run = panels(axes, (0.09, 0.15, 0.43, 0.74), (0.56, 0.15, 0.42, 0.74))
+        for panel, end in ((early, _until(run)), (all_run, run["time_s"][-1])):
+            for part in (*band, amplitudes(curves, run["limit_m"])):
+                part(panel)
+            panel.set(xlim=(run["time_s"][0], end), xlabel="time in s")
+            for index, stage in enumerate(run["stages"]):
+                begin, last = stage["start_s"], min(stage["end_s"], end)
+                if index % 2 == 0:
+                    panel.axvspan(begin, last, color=MUTED, alpha=0.12, linewidth=0)
+                if last - begin > _STAGE_NUMBER_WIDTH * end and (panel is early or last == end):
+                    look: dict[str, Any] = {"xycoords": _ACROSS, "va": "top", "ha": "center"}
+                    note(str(index + 1), ((begin + last) / 2, 1), (0, -3), **look)(panel)
+            panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: plain_number(unit.factor * value)))
+        early.set_ylabel(f"{AMPLITUDE[0]} in {unit.symbol}")
+        all_run.tick_params(labelleft=False)
+        handles, labels = all_run.get_legend_handles_labels()
+        figure_of(axes).legend(handles, labels, loc="upper left", ncols=4, borderaxespad=0.0, borderpad=0.1)
+
+    return draw("eccentric-amplitude", paint, columns=0, wide=True, height=2.7)
 
 
 def _band(x: ArrayLike, low: ArrayLike, high: ArrayLike) -> Paint:
@@ -120,9 +127,9 @@ def run_up(run: Record, locked: Record, rotor: Record, devices: Record | None = 
             *bands,
             amplitudes(curves, run["limit_m"]),
             at_critical,
-            y=AMPLITUDE,
+            y=("amplitude", "m"),
             columns=4,
-            height=2.6,
+            height=2.1,
             **over,
         ),
         draw(
@@ -133,7 +140,7 @@ def run_up(run: Record, locked: Record, rotor: Record, devices: Record | None = 
             lambda axes: axes.set_yticks((0, 90, 180)),
             y=("lag", "°"),
             ylim=(-30, 210),
-            height=1.8,
+            height=1.5,
             **over,
         ),
     ]

@@ -62,12 +62,12 @@ def tallies(evidence: Record) -> Record:
     """Numbers of claims, of checks and of comparisons with measurements by verdict."""
     judged = claims(evidence)
     measured = [case for case in checks(evidence) if case["kind"] == "validation"]
-    own = [case for case in checks(evidence) if case not in measured]
-    run = [case for case in own if case["verdict"] != "not run"]
+    solver_checks = [case for case in checks(evidence) if case not in measured]
+    run = [case for case in solver_checks if case["verdict"] != "not run"]
     return {
         "claims": verdict_counts(judged, CLAIM_VERDICTS),
         "claims_elsewhere": sum(elsewhere(case, evidence) for case in judged),
-        "checks": verdict_counts(own, CHECK_VERDICTS),
+        "checks": verdict_counts(solver_checks, CHECK_VERDICTS),
         "checks_run": len(run),
         "checks_passed": sum(case["verdict"] == "passed" for case in run),
         "measured": len(measured),

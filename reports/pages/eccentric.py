@@ -6,29 +6,14 @@ import math
 from typing import Final
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.patches import Circle, Rectangle
 
 from ringbalance.reports import summary
-from ringbalance.reports.figure import INK, MUTED, draw, line, panels
-from ringbalance.reports.mass_figures import (
-    BAND_SIGMAS,
-    friction_estimates,
-    imbalance_estimate,
-    mass_angles,
-    over_time,
-    run_up,
-)
+from ringbalance.reports.mass_figures import mass_angles, over_time, run_up
 from ringbalance.reports.pages import measured
 from ringbalance.reports.pages.plain import decision, decision_view
 from ringbalance.reports.pages.standing import CASES, CREDIBILITY, DEFAULTS, DOCUMENT, PARAMETERS
 from ringbalance.reports.section import Record, Section
-
-_MAGNIFIED_HALF: Final = 0.75
-"""Half of the width of the magnified picture, over the extent of the poles."""
-_MIN_EXTENT: Final = 0.02
-_UNIT_CIRCLE_HALF: Final = 1.12
-"""Half of the width of the picture, over the radius of the unit circle or of the farthest pole outside it."""
+from ringbalance.scene.uncertain import NORMAL_95
 
 
 def _run(_own: Record, evidence: Record) -> Record:
@@ -51,7 +36,7 @@ def _estimates(_own: Record, evidence: Record) -> Record:
     covariance = covariance + np.asarray(estimates["imbalance_rotor_covariance"])
     imbalance = [row[-1] for row in estimates["imbalance_kg_m"]]
     friction = [row[-1] for row in estimates["friction_arm_m"]]
-    variances = [(width / BAND_SIGMAS) ** 2 for width in estimates["friction_half_width_m"]]
+    variances = [(width / NORMAL_95) ** 2 for width in estimates["friction_half_width_m"]]
     entries = [
         ("imbalance along x", "kg m", imbalance[0], covariance[0, 0], true[0]),
         ("imbalance along y", "kg m", imbalance[1], covariance[1, 1], true[1]),
@@ -63,47 +48,13 @@ def _estimates(_own: Record, evidence: Record) -> Record:
             "name": name,
             "unit": unit,
             "value": float(value),
-            "width": BAND_SIGMAS * math.sqrt(variance) or None,
+            "width": NORMAL_95 * math.sqrt(variance) or None,
             "plant": float(right),
             "deviations": float(value - right) / math.sqrt(variance) if variance > 0 else None,
         }
         for name, unit, value, variance, right in entries
     ]
-    return {
-        "imbalance": imbalance_estimate(run, truth["unbalance_kg_m"]),
-        "friction": friction_estimates(run, arms),
-        "rows": rows,
-    }
-
-
-def _loops(_own: Record, evidence: Record) -> Record:
-    """Sampled poles of the drives' loops in the complex plane, with the unit circle, and magnified."""
-    loops = evidence["tuning"]["loops"]
-    groups = [np.array(loop["poles"]).reshape(-1, 2) for loop in loops]
-    points = np.concatenate([np.zeros((0, 2)), *groups])
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle, half = (low + high) / 2, _MAGNIFIED_HALF * max(*(high - low), _MIN_EXTENT)
-    circle_half = max(_UNIT_CIRCLE_HALF, float(np.abs(points).max()) * _UNIT_CIRCLE_HALF)
-
-    def paint(axes: Axes) -> None:
-        circle, near = panels(axes, (0.075, 0.15, 0.4, 0.74), (0.575, 0.15, 0.4, 0.74))
-        for panel, centre, reach in ((circle, (0.0, 0.0), circle_half), (near, middle, half)):
-            panel.add_patch(Circle((0, 0), 1, fill=False, color=INK, linewidth=1))
-            for index, group in enumerate(groups):
-                panel.plot(*group.T, linestyle="", **line(index, size=6))
-            ends = [(at - reach, at + reach) for at in centre]
-            panel.set(xlim=ends[0], ylim=ends[1], aspect="equal", xlabel="real part")
-        circle.set_ylabel("imaginary part")
-        frame = Rectangle(middle - half, 2 * half, 2 * half, fill=False, color=MUTED, linewidth=0.8)
-        circle.add_patch(frame)
-        for index, loop in enumerate(loops):
-            axes.plot([], [], linestyle="", label=loop["name"], **line(index, size=6))
-
-    return {
-        "poles": draw("sampled-poles", paint, columns=3, wide=True, height=3.3),
-        "unstable": [loop["name"] for loop in loops if not loop["stable"]],
-        "angles": mass_angles(evidence["closed_loop"]["balanced"]),
-    }
+    return {"rows": rows}
 
 
 BALANCER: Final = "eccentric_mass"
@@ -126,9 +77,9 @@ SECTIONS: Final = (
     ),
     Section(
         name="loops",
-        title="Drives: poles, margins and what they do",
+        title="Drives: margins and what they do",
         document="report",
-        show=_loops,
+        show=lambda _own, evidence: {"angles": mass_angles(evidence["closed_loop"]["balanced"])},
         template="masses_loops.html",
     ),
     Section(

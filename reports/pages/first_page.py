@@ -84,7 +84,6 @@ _RUN: Final = (
     "misadjustments",
 )
 _ROTOR: Final = ("rotor.influence_coefficient", "rotor.lag_angle", "rotor.initial_amplitude")
-_MAX_DOMINANT: Final = 3
 _GROUNDS: Final[dict[str, Record]] = {
     MET: {"facecolor": THIRD, "alpha": 0.28, "linewidth": 0},
     OPEN: {"facecolor": "none", "edgecolor": THIRD, "alpha": 0.8, "hatch": "///", "linewidth": 0},
@@ -200,10 +199,6 @@ def _view(record: Record, evidence: Record) -> Record:
         "in_place": advice_view({"remedies": [record["in_place"]]})["remedies"][0]
         if record.get("in_place")
         else "",
-        # Inputs that decide most of the differences between drawn devices.
-        "dominant": [
-            i for i, each in enumerate(record["ranking"][:_MAX_DOMINANT]) if each["index"] > each["noise"]
-        ],
         # An error of a model in the words of what it acts on.
         "acts_on": {f"{MODEL}{name}": kind.acts_on for name, kind in MODEL_KINDS.items()},
         "borrowed": [path for path in _ROTOR if "default" in (rows.get(path), origins.get(path))],

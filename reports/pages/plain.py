@@ -33,13 +33,15 @@ def decision(work: Work) -> Record:
     (judgement,) = judged_all(balancer, [{}], first=_MIN_DEVICES, most=_MAX_DEVICES)
     # Remedies and measurements are of use where these settings do not suffice.
     suffices = judgement.verdict == MET or bool(judgement.meets.all())
-    measures = () if suffices else tuple(ranked(balancer, judgement).findings())
+    ranking = ranked(balancer, judgement)
+    measures = () if suffices else tuple(ranking.findings())
     remedies = () if suffices else tried_remedies(balancer, judgement, search=searched)
     return {
         "limit_m": limit,
         "own": judgement_record(judgement),
         "remedies": [each.document() for each in remedies],
         "measures": [each.document() for each in measures],
+        "ranking": ranking.document() if judgement.meets.size >= _MIN_DEVICES else [],
         "recommended": None,
         "settings": settings_lines(work.scene, paths),
     }

@@ -8,16 +8,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from check_traces import traces, untrue
 
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.reports import evidence as evidence_module
-from ringbalance.reports.evidence import parameters
+from ringbalance.reports.evidence import _BAND_DEVICES, _run_up_record, parameters
 from ringbalance.reports.page import render
 from ringbalance.reports.pages import plain
 from ringbalance.reports.pages.eccentric import SECTIONS
 from ringbalance.reports.report import write_report
+from ringbalance.results.numbers import shown
 from ringbalance.scene import bundled_scene, load_scene
 from scenes import with_tables
 
@@ -46,6 +49,7 @@ def folder(scene: EccentricScene, tmp_path_factory: pytest.TempPathFactory) -> P
         # The claims of its paper have tests of their own, and so have the intervals of the study.
         patch.setattr(evidence_module, "load_cases", tuple)
         patch.setattr(plain, "_MAX_DEVICES", 2)
+        patch.setattr(evidence_module, "_BAND_DEVICES", 2)
         write_report(scene, out, scene_text='name = "small"\n')
     return out
 
@@ -65,8 +69,7 @@ def test_report_and_annex_are_written_with_their_figures(folder: Path) -> None:
     }
     names = {path.stem for path in (folder / "figures").iterdir()}
     assert names >= {
-        *("eccentric-amplitude", "eccentric-run-up", "eccentric-imbalance", "eccentric-friction"),
-        *("eccentric-angles", "sampled-poles"),
+        *("eccentric-amplitude", "eccentric-run-up", "eccentric-lag", "eccentric-angles"),
     }
 
 
@@ -110,12 +113,39 @@ def test_every_value_has_its_origin(scene: EccentricScene) -> None:
         assert arm.endswith("m")
 
 
-@pytest.mark.usefixtures("unwritten")
-def test_unstable_loops_are_named(evidence: Record) -> None:
-    changed = json.loads(json.dumps(evidence))
-    assert "All lie within: stable." in render(changed)["report.html"]
-    changed["tuning"]["loops"][0] |= {"name": "speed control", "poles": [[-1.3, 0.0]], "stable": False}
-    assert "unstable: speed control." in render(changed)["report.html"]
+def test_the_band_is_of_the_verdict_s_devices(evidence: Record) -> None:
+    drawn, judged = evidence["drawn"], evidence["summary"]["own"]["fraction"]
+    assert (drawn["runs"], drawn["settled"]) == (judged["of"], judged["count"])
+    assert _BAND_DEVICES == plain._MAX_DEVICES == 64
+
+
+def test_energy_run_up_and_what_decides_are_on_the_first_page(folder: Path, evidence: Record) -> None:
+    page = re.sub(r"<[^>]+>", "", (folder / "report.html").read_text())
+    run = evidence["closed_loop"]["balanced"]
+    assert f"the drives take {shown(run['energy_J'], 'J', digits=2)} in this run" in page
+    energy = evidence["summary"]["own"]["energy_J"]
+    assert 0 < energy["p50"] <= energy["p90"]
+    assert f"up to {shown(energy['p90'], 'J', digits=2)} in nine tenths" in page
+    assert "Run-up: with the masses locked the limit of" in page
+    assert "What the verdict assumes" in page
+
+
+def test_the_run_up_s_numbers_follow_from_the_whirl(scene: EccentricScene) -> None:
+    """At the speed found the locked rotor is at its limit; what is left grows by |alpha| of the speeds."""
+    limit = 1.5 * scene.supervisor.limit
+    record = _run_up_record(with_tables(scene, supervisor={"limit": limit}))
+    assert record is not None
+    plant, angles = PlantParameters.of(scene), scene.masses.initial_angle
+    speeds = scene.rotor.profile[1]
+    assert record["start_rad_s"] == speeds[0]
+    if (speed := record["locked_limit_speed_rad_s"]) is not None:
+        below, above = (abs(plant.steady_whirl(part * speed, angles)) for part in (1.0, 1.01))
+        assert below <= limit < above
+    grown = max(abs(plant.influence(speed)) for speed in np.linspace(speeds[0], speeds[-1], 5000))
+    left = record["limit_at_start_m"] * grown / abs(plant.influence(speeds[0]))
+    assert left == pytest.approx(limit, rel=1e-3)
+    constant = with_tables(scene, rotor={"speed_profile": scene.rotor.speed_profile[:1]})
+    assert _run_up_record(constant) is None
 
 
 @pytest.mark.usefixtures("unwritten")

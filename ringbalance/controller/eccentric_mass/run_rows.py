@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
@@ -170,7 +170,7 @@ def eccentric_rows(run: EccentricRun) -> Rows:
     )
 
 
-def amplitude_band(runs: Sequence[RunResult], *, end: float) -> dict[str, Any]:
+def amplitude_band(runs: Iterable[RunResult], *, end: float) -> dict[str, Any]:
     """Smallest, median and largest amplitude of runs at equally spaced times; the amplitude of a run is its
     maximum since the time before, so that no peak is lost.
 
@@ -178,9 +178,9 @@ def amplitude_band(runs: Sequence[RunResult], *, end: float) -> dict[str, Any]:
         last value.
     """
     time = np.linspace(0.0, end, _BAND_INSTANTS)
-    peaks = []
+    peaks, settled = [], 0
     for result in runs:
-        run = result.run
+        run, settled = result.run, settled + result.settled
         edges = np.minimum(np.searchsorted(run.time, time), run.time.size - 1)
         since = np.concatenate([edges[:1], edges[:-1]])
         peaks.append([run.amplitude[a : max(b, a) + 1].max() for a, b in zip(since, edges, strict=True)])
@@ -190,6 +190,6 @@ def amplitude_band(runs: Sequence[RunResult], *, end: float) -> dict[str, Any]:
         "low_m": low,
         "middle_m": middle,
         "high_m": high,
-        "runs": len(runs),
-        "settled": sum(each.settled for each in runs),
+        "runs": len(peaks),
+        "settled": settled,
     }

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from ringbalance.controller.algorithms.algorithm import Measurement as Measurement
     from ringbalance.controller.algorithms.algorithm import ValveCommand as ValveCommand
     from ringbalance.controller.compare import Comparison as Comparison
+    from ringbalance.controller.eccentric_mass.loop_matrices import EccentricLoop as EccentricLoop
+    from ringbalance.controller.eccentric_mass.loop_matrices import eccentric_loop as eccentric_loop
     from ringbalance.controller.eccentric_mass.run_record import EccentricRun as EccentricRun
     from ringbalance.controller.eccentric_mass.scene_records import EccentricScene as EccentricScene
     from ringbalance.controller.judging.tuning import Tuning as Tuning
@@ -112,6 +114,7 @@ _NAMES = {
         "ValveCommand",
     ),
     "controller.compare": ("Comparison",),
+    "controller.eccentric_mass.loop_matrices": ("EccentricLoop", "eccentric_loop"),
     "controller.eccentric_mass.run_record": ("EccentricRun",),
     "controller.eccentric_mass.scene_records": ("EccentricScene",),
     "controller.liquid_ring.linear_loop": ("LinearLoop", "linear_loop"),

@@ -112,7 +112,7 @@ _OPTIONS: Final = {
         Literal["c", "st", "csv", "python", "js", "fmi2", "fmi3", "simulink", "openmodelica", "twincat"],
         REQUIRED,
     ),
-    "block": ShellOption(Literal["law", "disc", "controller"], "law"),
+    "block": ShellOption(Literal["law", "disc", "controller", "plant"] | None),
     "name": ShellOption(str, ""),
     "points": ShellOption(int | None, limits=_GRID),
     "vary": ShellOption(list[str] | None, parsing={"consume_multiple": 1}),
@@ -195,14 +195,16 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         begin="runs ...",
     ),
     "export": ShellCommand(
-        """Law, disc or controller for another program: C, FMI, structured text, Python, a web page, a table.
+        """Law, disc, controller or plant for another program: C, FMI, structured text, Python, a table.
 
         Args:
             to: c (C99), fmi2 or fmi3 (a unit for co-simulation, FMI 2.0 or 3.0), st (IEC 61131-3 structured
-                text), python or js (a module without dependencies), or csv (a grid); simulink and
-                openmodelica take fmi2, twincat takes st.
-            block: law (velocity and regime of a query), disc (fills, gas and moment of all chambers in time,
-                and the rotor's vibration), or controller (the scene's algorithm with its settings).
+                text), python or js (a module without dependencies), or csv (a grid of the law, or the
+                matrices of the masses' loop); simulink and openmodelica take fmi2, twincat takes st.
+            block: of a liquid ring law (velocity and regime of a query), disc (fills, gas and moment of all
+                chambers in time, and the rotor's vibration), or controller (the scene's algorithm with its
+                settings), default law; of eccentric masses controller, the default, or plant (rotor, masses
+                and drives in time).
             out: folder for the files.
             name: name of files and functions; default that of the scene.
             points: points on each axis of the grid of csv, 2 to 1001; default 41.

@@ -1,4 +1,4 @@
-"""Blocks that a host can run: law, disc in time, controller; each of constants and one row of numbers.
+"""Blocks that a host can run, of liquid rings and eccentric masses: constants, and one row of numbers.
 
 A block's functions read the constants and change the row, in which each variable has its index; the source is
 the same for every host.
@@ -6,12 +6,14 @@ the same for every host.
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.resources import files
 from types import ModuleType
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, cast
 
 import numpy as np
 
@@ -23,7 +25,7 @@ from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.export import chamber, disc, law_based
 from ringbalance.export.compact import VELOCITIES, CompactLaw, Tables, compact_law
-from ringbalance.export.translate import Source, number_text
+from ringbalance.export.translate import Source, number_text, python_functions
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.pieces import point, query
@@ -32,7 +34,7 @@ from ringbalance.reduced_model.terms import FILLING, LAG
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
-Kind = Literal["law", "disc", "controller"]
+Kind = Literal["law", "disc", "controller", "strategy", "plant"]
 Numbers = tuple[float, ...]
 _LONGEST_PART_S: Final = 1e-3
 """Longest part of a step of the disc, s."""
@@ -77,7 +79,7 @@ class Variable:
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """Law, disc or controller for a host."""
+    """Law, disc, controller or plant for a host."""
 
     kind: Kind
     title: str
@@ -96,10 +98,14 @@ class Block:
     timed: bool
     """True if a step advances by a time."""
     variables: tuple[Variable, ...]
+    period: float = 0.01
+    """Time of a step where a host is given none, s."""
+    flat: Source | None = None
+    """The source in place of that of `modules`; it uses sin, cos, atan, acos, exp and log of the host."""
 
     def source(self, entries: Sequence[str] = ()) -> Source:
         """Source of some functions and all that they call; default of the one that a host calls."""
-        return Source.of_modules(self.modules, entries or (self.steps,))
+        return self.flat or Source.of_modules(self.modules, entries or (self.steps,))
 
     @property
     def size(self) -> int:
@@ -115,9 +121,17 @@ class Block:
         indices = {each.name: each.index for each in self.variables if each.input}
         for name, value in inputs.items():
             row[indices[name]] = float(value)
-        step = getattr(self.modules[-1], self.steps)
-        step(self.constants, *(self.tables or ()), row, *((time,) if self.timed else ()))
+        self._step(self.constants, *(self.tables or ()), row, *((time,) if self.timed else ()))
         return self.outputs(row)
+
+    @cached_property
+    def _step(self) -> Callable[..., None]:
+        if self.flat is None:
+            step: Callable[..., None] = getattr(self.modules[-1], self.steps)
+            return step
+        names: dict[str, Any] = {"Law": list, "Query": list, **vars(math)}
+        exec(python_functions(self.flat), names)
+        return cast(Callable[..., None], names[self.steps])
 
 
 def law_block(law: CompactLaw) -> Block:
@@ -135,7 +149,7 @@ def law_block(law: CompactLaw) -> Block:
         modules=(point, query, chamber),
         steps="answer_all",
         timed=False,
-        variables=_variables("law", lambda offset, _: int(getattr(point, offset)), most=law.max_fill_ratio),
+        variables=variables_of("law", lambda offset, _: int(getattr(point, offset)), most=law.max_fill_ratio),
     )
 
 
@@ -180,7 +194,7 @@ def disc_block(scene: Scene, law: CalibratedLaw, *, compact: CompactLaw | None =
         modules=(point, query, chamber, disc),
         steps="step",
         timed=True,
-        variables=_variables("disc", index_of, most=law.max_fill_ratio, chambers=scene.disc.chambers),
+        variables=variables_of("disc", index_of, most=law.max_fill_ratio, chambers=scene.disc.chambers),
     )
 
 
@@ -277,7 +291,7 @@ def controller_block(
         modules=(point, valve_steps, steps),
         steps="step",
         timed=True,
-        variables=_variables("controller", index_of, chambers=chambers),
+        variables=variables_of("controller", index_of, chambers=chambers),
     )
 
 
@@ -325,18 +339,18 @@ def _law_based_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw | Non
         modules=(point, query, chamber, disc, valve_steps, law_steps, law_based),
         steps="control",
         timed=True,
-        variables=_variables("controller", index_of, chambers=chambers),
+        variables=variables_of("controller", index_of, chambers=chambers),
     )
 
 
 def declared() -> dict[str, Any]:
-    """Variables of each kind of block, `MOST` for the largest fill ratio and `#` for a chamber, and units."""
+    """Variables of each kind of block, `MOST` for the largest fill ratio and `#` for a letter, and units."""
     return tomllib.loads(
         files("ringbalance.export").joinpath("templates/variables.toml").read_text(encoding="utf-8")
     )
 
 
-def _variables(
+def variables_of(
     kind: Kind, index_of: Callable[[str, int | None], int], *, most: float = 0.0, chambers: int = 2
 ) -> tuple[Variable, ...]:
     """Variables as declared. Args: `index_of`: index by name of the offset and, if any, chamber."""
@@ -344,7 +358,7 @@ def _variables(
     for each in declared()[kind]:
         limits = {key: text.replace("MOST", number_text(most)) for key, text in each["range"].items()}
         description = each["description"].replace("MOST", number_text(most))
-        letters = chamber_letters(chambers) if "#" in each["name"] else (None,)
+        letters = each.get("letters") or (chamber_letters(chambers) if "#" in each["name"] else (None,))
         for number, letter in enumerate(letters):
             variables.append(
                 Variable(

@@ -97,7 +97,7 @@ def _description(block: Block, name: str, *, second: bool) -> bytes:
     for unit_name, base in declared()["units"].items():
         if unit_name in used:
             ET.SubElement(ET.SubElement(units, "Unit", name=unit_name), "BaseUnit", dict(base))
-    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize="0.01")
+    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize=f"{block.period:g}")
     variables, structure = (ET.SubElement(root, each) for each in ("ModelVariables", "ModelStructure"))
     for number, each in enumerate(block.variables):
         heads = {

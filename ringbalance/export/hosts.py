@@ -13,6 +13,7 @@ import numpy as np
 
 from ringbalance.export.blocks import RANGE, Block, Variable
 from ringbalance.export.translate import (
+    MATHS,
     PER_PIECE,
     c_functions,
     exact_text,
@@ -195,6 +196,13 @@ def _declared(block: Block, language: str) -> Iterator[str]:
             yield f"{name} = (\n{text},\n)\n"
 
 
+_BITS: Final = (
+    "Same bits on every machine with IEEE 754 doubles: only + - * / sqrt and comparisons.",
+    "Same bits as every other host: only + - * / Math.sqrt and comparisons.",
+)
+_CLOSE: Final = "A step equals ringbalance's to 1e-12: sin, cos, atan, acos, exp and log are the host's own."
+
+
 def template(name: str) -> str:
     """Text of a template."""
     return files("ringbalance.export").joinpath(f"templates/{name}.txt").read_text(encoding="utf-8")
@@ -205,12 +213,16 @@ def filled(frame: str, block: Block, name: str, **parts: str) -> str:
     text = template(frame)
     language = next((each for each in ("st", "python", "js") if frame.endswith(each)), "c")
     written = _TEXT[language]
+    bits = _BITS[language == "js"] if block.flat is None else _CLOSE
     most = next((each.range["max"] for each in block.variables if each.range.get("unit") == "1"), "")
     return Template(text).substitute(
         title=f"{block.title}, made by ringbalance from {plain_name(block.scene)}.",
         facts=block.facts.replace("\n   ", "\n * ") if language == "js" else block.facts,
         name=name,
         upper=name.upper(),
+        bits=bits,
+        more="" if block.flat is None else f"{_CLOSE} ",
+        maths="sqrt" if block.flat is None else ", ".join(sorted(MATHS)),
         range=RANGE,
         most=most,
         count=len(block.constants),

@@ -15,7 +15,6 @@ from ringbalance.results.result import csv_text
 
 _FOLDER: Final = "extra/org.fmi-standard.fmi-ls-ref"
 _MANIFEST: Final = "http://fmi-standard.org/fmi-ls-manifest"
-_STEP_S: Final = 0.01
 _PRESSURES_PA: Final = (0.0, 1e5, 2e5, 4e5, 8e5)
 _OPEN_TIMES_S: Final = (0.06, 0.02, 0.03)
 """Commands to the disc's first chambers one after the other, five rows apart at least."""
@@ -30,8 +29,7 @@ def reference_files(block: Block, name: str) -> dict[str, bytes]:
     outputs: list[Mapping[str, float]] = []
     for stimulus in _stimuli(block):
         inputs.append(stimulus)
-        outputs.append(block.run(row, _STEP_S, stimulus))
-    integers = {each.name for each in block.variables if each.kind != "Real"}
+        outputs.append(block.run(row, block.period, stimulus))
 
     ET.register_namespace("fmi-ls", _MANIFEST)
     standard = {"name": "org.fmi-standard.fmi-ls-ref", "version": "1.0.0-alpha.1"}
@@ -43,15 +41,16 @@ def reference_files(block: Block, name: str) -> dict[str, bytes]:
     ET.indent(root)
     manifest: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
     return {
-        f"{_FOLDER}/{name}_in.csv": _csv(inputs, 0, integers),
-        f"{_FOLDER}/{name}_out.csv": _csv(outputs, 1, integers),
+        f"{_FOLDER}/{name}_in.csv": _csv(inputs, 0, block),
+        f"{_FOLDER}/{name}_out.csv": _csv(outputs, 1, block),
         f"{_FOLDER}/fmi-ls-manifest.xml": manifest,
     }
 
 
-def _csv(rows: list[Mapping[str, float]], later: int, integers: set[str]) -> bytes:
+def _csv(rows: list[Mapping[str, float]], later: int, block: Block) -> bytes:
     """CSV file of rows. Args: `later`: steps from the beginning to the first row."""
-    times = [repr((row + later) * _STEP_S) for row in range(len(rows))]
+    integers = {each.name for each in block.variables if each.kind != "Real"}
+    times = [repr((row + later) * block.period) for row in range(len(rows))]
     columns = {
         name: [str(int(row[name])) if name in integers else repr(row[name]) for row in rows]
         for name in rows[0]
@@ -72,7 +71,16 @@ def _stimuli(block: Block) -> Iterator[Mapping[str, float]]:
     elif block.kind == "disc":
         for name, open_time in zip(zeros, _OPEN_TIMES_S, strict=False):
             for step in range(8):
-                yield {**zeros, name: max(open_time - step * _STEP_S, 0.0)}
+                yield {**zeros, name: max(open_time - step * block.period, 0.0)}
+    elif block.kind == "strategy":
+        # A rotor that whirls by 0.1 mm, and masses at rest.
+        for step in range(240):
+            turn, still = 10.0 * block.period * step, {"speed": 10.0, "angle_1": 1.0, "angle_2": -1.0}
+            whirl = {"position_x": 1e-4, "velocity_y": 1e-3} if step % 2 else {"position_x": 1.1e-4}
+            yield {**zeros, **still, **whirl, "rotor_angle": turn}
+    elif block.kind == "plant":
+        for step in range(240):
+            yield {**zeros, "voltage_1": 1.0 if step < 120 else -2.0}
     else:
         for x, y in _VIBRATIONS_M:
             for _ in range(60):

@@ -17,6 +17,8 @@ NUMBER, WHOLE, TRUTH, NOTHING = "float", "int", "bool", "None"
 LAW, CELLS, PIECES, LEVELS, QUERY = "Law", "Cells", "Pieces", "Levels", "Query"
 """Types of the subset; all but the last are only read, cells are bytes, pieces of single precision."""
 PER_PIECE: Final = 8  # numbers in a row of `Pieces` or `Levels`
+MATHS: Final = ("sqrt", "sin", "cos", "exp", "log", "atan", "acos")
+"""Functions of one number that all languages have; only the first gives the same bits in each."""
 _BINARY: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/"}
 _NOT_OF: Final = {NUMBER: ast.FloorDiv, WHOLE: ast.Div}
 
@@ -129,8 +131,8 @@ class Language:
     to_number: str
     whole_quotient: str
     """Format of the quotient of two whole numbers, from dividend and divisor."""
-    root: str
-    """Format of a square root."""
+    maths: Mapping[str, str]
+    """Formats of functions of one number: of Python's `math`, and `abs`."""
     truths: tuple[str, str]
     """False and true."""
     variable: str
@@ -145,6 +147,8 @@ class Language:
     close_if: str
     open_while: str
     close_while: str
+    leave: str
+    """Statement that ends a loop."""
     returned: Sequence[str]
     """Lines that end a function, from its name and its result."""
     ended: str
@@ -179,7 +183,7 @@ C99: Final = Language(
     to_whole="(int)({})",
     to_number="(double)({})",
     whole_quotient="{} / {}",
-    root="sqrt({})",
+    maths={"abs": "fabs({})"} | {name: f"{name}({{}})" for name in MATHS},
     truths=("0", "1"),
     variable="{}",
     function="{}",
@@ -191,6 +195,7 @@ C99: Final = Language(
     close_if="}",
     open_while="while ({}) {{",
     close_while="}",
+    leave="break;",
     returned=("return {1};",),
     ended="return;",
     element={
@@ -219,7 +224,7 @@ JAVASCRIPT: Final = replace(
     to_whole="(({}) | 0)",
     to_number="{}",
     whole_quotient="({} / {}) | 0",
-    root="Math.sqrt({})",
+    maths={name: f"Math.{name}({{}})" for name in (*MATHS, "abs")},
     truths=("false", "true"),
     # Rows of a table follow one another in one array.
     element={
@@ -250,7 +255,7 @@ def structured_text(prefix: str) -> Language:
         to_whole="TRUNC({})",
         to_number="DINT_TO_LREAL({})",
         whole_quotient="{} / {}",
-        root="SQRT({})",
+        maths={name: ("LN" if name == "log" else name.upper()) + "({})" for name in (*MATHS, "abs")},
         truths=("FALSE", "TRUE"),
         variable="v_{}",
         function=prefix + "_{}",
@@ -262,6 +267,7 @@ def structured_text(prefix: str) -> Language:
         close_if="END_IF;",
         open_while="WHILE {} DO",
         close_while="END_WHILE;",
+        leave="EXIT;",
         returned=(f"{prefix}_{{0}} := {{1}};", "RETURN;"),
         ended="RETURN;",
         element={
@@ -309,6 +315,8 @@ class Writer:
                     yield self.language.open_while.format(self._typed(test, TRUTH))
                     yield from self._inner(inner)
                     yield self.language.close_while
+                case ast.Break():
+                    yield self.language.leave
                 case ast.Return(value=None):
                     yield self.language.ended
                 case ast.Return(value=ast.expr() as value):
@@ -370,7 +378,8 @@ class Writer:
         signs = self.language.operators
         match node:
             case ast.UnaryOp(op=ast.USub(), operand=operand):
-                return f"-{self._operand(operand, NUMBER)}", NUMBER
+                kind = self._expression(operand)[1]
+                return f"-{self._operand(operand, kind)}", kind
             case ast.UnaryOp(op=ast.Not() as no, operand=operand):
                 return f"{signs[type(no)]}({self._typed(operand, TRUTH)})", TRUTH
             case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _BINARY:
@@ -405,8 +414,8 @@ class Writer:
         return f"({text})" if isinstance(node, ast.BinOp | ast.UnaryOp | ast.BoolOp | ast.Compare) else text
 
     def _call(self, node: ast.expr, name: str, arguments: Sequence[ast.expr]) -> tuple[str, str]:
-        if name == "sqrt" and len(arguments) == 1:
-            return self.language.root.format(self._typed(arguments[0], NUMBER)), NUMBER
+        if name in self.language.maths and name not in self.source.functions:
+            return self.language.maths[name].format(self._typed(arguments[0], NUMBER)), NUMBER
         if name == "int":
             text, kind = self._expression(arguments[0])
             if kind == WHOLE:

@@ -14,6 +14,10 @@ AnyScene: TypeAlias = SceneFile
 Kind = TypeVar("Kind", bound=SceneFile)
 
 
+_REASON: Final = {"liquid_ring": ": its law is of a liquid in chambers"}
+_ANY: Final = "report, simulate, tune, compare, sweep, fit and export"
+
+
 def scene_as(kind: type[Kind], scene: SceneFile) -> Kind:
     """Narrow a scene to a kind. Raises: SceneError: it has another balancer."""
     if isinstance(scene, kind):
@@ -22,8 +26,8 @@ def scene_as(kind: type[Kind], scene: SceneFile) -> Kind:
         file=scene.file,
         key="balancer",
         value=f'"{scene.balancer}"',
-        problem=f"this needs a scene of the balancer {kind.balancer}",
-        allowed=f'balancer = "{kind.balancer}"; report, simulate, tune, compare and fit take any',
+        problem=f"this needs a scene of the balancer {kind.balancer}{_REASON.get(kind.balancer, '')}",
+        allowed=f'balancer = "{kind.balancer}"; {_ANY} take any',
     )
     raise SceneError([fault])
 

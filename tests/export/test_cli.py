@@ -43,7 +43,6 @@ def test_it_writes_the_files_it_names(
         ([OIL, "--to", "python", "--name", "math"], '--name = "math"'),
         ([OIL, "--to", "rust"], "rust"),
         ([OIL, "--to", "c", "--all-systems"], "--all-systems = true"),
-        ([str(rb.bundled_scene("driven_masses_small")), "--to", "c"], "eccentric_mass"),
         (["none.toml", "--to", "c"], "none.toml"),
     ],
 )

@@ -25,7 +25,7 @@ HEAD = "N, X = 2, 0.5\n\ndef f(c: Law, a: float, n: int) -> float:\n"
     [
         "return a ** 2.0",
         "return a % 2.0",
-        "return exp(a)",
+        "return exp2(a)",
         "return a * 2",
         "return a // 2.0",
         "return float(n / 2)",
@@ -36,7 +36,7 @@ HEAD = "N, X = 2, 0.5\n\ndef f(c: Law, a: float, n: int) -> float:\n"
         "for x in c:\n        pass",
         "a += 1.0",
         "return 0.0 < a < 1.0",
-        "return abs(a)",
+        "return abs(n)",
         "X = a",
     ],
 )

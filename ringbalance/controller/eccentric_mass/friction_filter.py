@@ -57,7 +57,7 @@ FRICTION_FILTER: Final = np.dtype(
 
 
 @in_place
-def _friction_flow(
+def friction_flow(
     model: TrackModel, rate: float, arm: float, speed: float, torque: float, step: float, euler: bool
 ) -> tuple[float, float, float]:
     """Integrate a moving mass over one step by the exponential Rosenbrock-Euler rule, stable for any step.
@@ -90,10 +90,10 @@ def friction_step(
 ) -> None:
     """Predict estimate and covariance over one step, and correct them by the encoder's rate.
 
-    Source: Eqs. 32 to 38 of the paper on eccentric masses, with `_friction_flow` as transition and Joseph's
+    Source: Eqs. 32 to 38 of the paper on eccentric masses, with `friction_flow` as transition and Joseph's
         update.
     """
-    rate, by_rate, by_arm = _friction_flow(model, estimate.rate, estimate.arm, speed, torque, step, euler)
+    rate, by_rate, by_arm = friction_flow(model, estimate.rate, estimate.arm, speed, torque, step, euler)
     wander, r = noise.arm * step, noise.rate_variance
     p11 = (
         by_rate**2 * estimate.rate_variance

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -88,13 +89,16 @@ def sensor_noise(scene: EccentricScene, seed: Seed) -> FloatArray:
 
 @compiled
 def measure(
-    machine: Machine, settings: StrategySettings, row: FloatArray, time: float, noise: FloatArray
+    machine: Machine, laboratory: bool, row: FloatArray, time: float, noise: Sequence[float] | FloatArray
 ) -> EccentricMeasurement:
-    """Sample of the sensors with noise: two displacements, m, velocities, m/s, angles, rad, rates, rad/s."""
+    """Sample of the sensors, along fixed axes if `laboratory`.
+
+    Args: `noise`: of two displacements, m, velocities, m/s, angles, rad, and rates, rad/s.
+    """
     speed, speed_rate = speed_at(machine.times, machine.speeds, time)
     turn = turned(machine.times, machine.speeds, time)
     position, velocity = complex(row[X], row[Y]), complex(row[X_RATE], row[Y_RATE])
-    if settings.laboratory:
+    if laboratory:
         outward = complex(math.cos(turn), math.sin(turn))
         velocity = outward * (velocity + complex(0.0, speed) * position)
         position = outward * position
@@ -118,7 +122,7 @@ def _run_interval(
     """Run samples `first` to `after - 1`, each followed by a step of the plant, into the history."""
     energy = 0.0 if first == 0 else history[first - 1].energy
     for i in range(first, after):
-        measurement = measure(machine, settings, row, i * settings.step, noise[i])
+        measurement = measure(machine, settings.laboratory, row, i * settings.step, noise[i])
         if machine.locked:
             memory.cause, memory.hold = LOCKED_MASSES, RELEASED
             memory.goal[0], memory.goal[1] = row[ANGLE], row[ANGLE + 1]
@@ -228,7 +232,7 @@ def simulate_eccentric(
     noise = sensor_noise(scene, scene.run.seed if seed is None else seed)
     row = plant_row(scene.masses.initial_angle, LOCKED if machine.locked else STUCK)
     if not machine.locked:
-        begin_strategy(settings, memory[0], measure(machine, settings, row, 0.0, noise[0]))
+        begin_strategy(settings, memory[0], measure(machine, settings.laboratory, row, 0.0, noise[0]))
     for begin in range(0, scene.samples, size):
         end = min(begin + size, scene.samples)
         _run_interval(settings, machine, noise, memory[0], row, history, begin, end)

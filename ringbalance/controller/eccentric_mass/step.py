@@ -170,8 +170,8 @@ def _estimate_friction(settings: StrategySettings, memory: Record, motion: Motio
     lever = friction.track.moment**2 / settings.law.whirl.mass * math.cos(first - second)
     lever /= step
     for i in range(2):
-        other, rate, smooth, estimate = 1 - i, motion.rate[i], memory.rate[i], memory.friction[i]
-        torque = memory.torque[i] / friction.every + lever * (motion.rate[other] - memory.last_rate[other])
+        rate, smooth, estimate = motion.rate[i], memory.rate[i], memory.friction[i]
+        torque = memory.torque[i] / friction.every + lever * (motion.rate[1 - i] - memory.last_rate[1 - i])
         # One noisy sample of the rate proves no motion; the smoothed rate does.
         moves = abs(smooth) > friction.least_motion and smooth * rate > 0 and abs(rate) > settings.law.slow
         if not moves or estimate.rate * rate <= 0:
@@ -211,14 +211,14 @@ def _motor_torques(settings: StrategySettings, memory: Record, motion: Motion) -
     )
     load = rotor_load(law, motion, memory.imbalance, acceleration)
     return (
-        control[0] + load[0] + _compensation(settings, memory, motion, 0),
-        control[1] + load[1] + _compensation(settings, memory, motion, 1),
+        control[0] + load[0] + _compensation(settings, memory, 0, motion.speed, first_rate),
+        control[1] + load[1] + _compensation(settings, memory, 1, motion.speed, second_rate),
     )
 
 
 @in_place
-def _compensation(settings: StrategySettings, memory: Record, motion: Motion, mass: int) -> float:
-    """Torque that compensates a mass's estimated friction, N m."""
+def _compensation(settings: StrategySettings, memory: Record, mass: int, speed: float, rate: float) -> float:
+    """Torque that compensates a mass's estimated friction at its rate, N m."""
     # Noise only: a motor stronger than assumed makes the estimated arm smaller, but its torque larger.
     distance, deviation = memory.goal[mass] - memory.angle[mass], arm_noise(memory, mass)
     if memory.stage == FRICTION:
@@ -227,5 +227,4 @@ def _compensation(settings: StrategySettings, memory: Record, motion: Motion, ma
             return 0.0
         # The arm is not yet known; its estimate alone is compensated.
         distance, deviation = math.copysign(math.inf, settings.friction.drive_speed), 0.0
-    arm, rate = memory.friction[mass].arm, motion.rate[mass]
-    return friction_torque(settings.law, arm, deviation, motion.speed, rate, distance)
+    return friction_torque(settings.law, memory.friction[mass].arm, deviation, speed, rate, distance)

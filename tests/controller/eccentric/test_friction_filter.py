@@ -15,7 +15,7 @@ from ringbalance.controller.eccentric_mass.friction_filter import (
     FRICTION_FILTER,
     FrictionNoise,
     TrackModel,
-    _friction_flow,
+    friction_flow,
     friction_restart,
     friction_step,
 )
@@ -45,18 +45,18 @@ def accurate(rate: float, arm: float, torque: float, duration: float) -> float:
 
 @pytest.mark.parametrize(("rate", "arm", "torque"), CASES)
 def test_flow_is_the_motion(rate: float, arm: float, torque: float) -> None:
-    flow = _friction_flow(TRACK, rate, arm, SPEED, torque, STEP, False)
+    flow = friction_flow(TRACK, rate, arm, SPEED, torque, STEP, False)
     change = accurate(rate, arm, torque, STEP) - rate
     assert flow[0] - rate == pytest.approx(change, rel=1e-3, abs=1e-9)
     # Of second order: a tenth of the step, a thousandth of the error, down to round-off.
-    short = _friction_flow(TRACK, rate, arm, SPEED, torque, STEP / 10, False)
+    short = friction_flow(TRACK, rate, arm, SPEED, torque, STEP / 10, False)
     error = abs(short[0] - accurate(rate, arm, torque, STEP / 10))
     assert error <= 2e-3 * abs(flow[0] - accurate(rate, arm, torque, STEP)) + 1e-12
 
 
 @pytest.mark.parametrize(("rate", "arm", "torque"), CASES)
 def test_derivatives_are_the_flows(rate: float, arm: float, torque: float) -> None:
-    flow = _friction_flow(TRACK, rate, arm, SPEED, torque, STEP, False)
+    flow = friction_flow(TRACK, rate, arm, SPEED, torque, STEP, False)
     small = 1e-5
     by_rate = (accurate(rate + small, arm, torque, STEP) - accurate(rate - small, arm, torque, STEP)) / (
         2 * small
@@ -88,7 +88,7 @@ def drive(*, arm: float, seed: int, steps: int = 2000, stray: bool = False) -> n
 def _printed_step(estimate: np.void, seen: float, torque: float) -> None:
     """One step with the printed f_13 = -dt chi (W + w)^2 sgn(w)/r_b, with chi in excess."""
     rate, arm, p11, p12, p22 = estimate.tolist()
-    later, by_rate, _ = _friction_flow(TRACK, rate, arm, SPEED, torque, STEP, False)
+    later, by_rate, _ = friction_flow(TRACK, rate, arm, SPEED, torque, STEP, False)
     by_arm = -STEP * arm * (SPEED + rate) ** 2 / 0.23
     jacobian = np.array([[by_rate, by_arm], [0.0, 1.0]])
     covariance = jacobian @ np.array([[p11, p12], [p12, p22]]) @ jacobian.T
@@ -129,7 +129,7 @@ def test_the_printed_jacobian_never_starts_from_zero() -> None:
 def test_the_printed_transition_is_not_the_flow() -> None:
     """Eq. 33 multiplies the state with the Jacobian: the drive's torque drops out of the prediction."""
     rate, arm, torque = 0.4, 0.01, 0.1
-    flow = _friction_flow(TRACK, rate, arm, SPEED, torque, STEP, False)
+    flow = friction_flow(TRACK, rate, arm, SPEED, torque, STEP, False)
     linear = flow[1] * rate + flow[2] * arm
     true = accurate(rate, arm, torque, STEP)
     assert abs(flow[0] - true) < 1e-7
@@ -143,11 +143,11 @@ def test_a_resting_mass_teaches_nothing() -> None:
 
 
 def test_euler_is_close_for_short_steps_and_unstable_for_long_ones() -> None:
-    near = _friction_flow(TRACK, 0.4, 0.01, SPEED, 0.1, 1e-4, True)
-    exact = _friction_flow(TRACK, 0.4, 0.01, SPEED, 0.1, 1e-4, False)
+    near = friction_flow(TRACK, 0.4, 0.01, SPEED, 0.1, 1e-4, True)
+    exact = friction_flow(TRACK, 0.4, 0.01, SPEED, 0.1, 1e-4, False)
     assert near[0] == pytest.approx(exact[0], rel=1e-3)
-    assert abs(_friction_flow(TRACK, 0.4, 0.01, SPEED, 0.1, 0.2, True)[1]) > 1
-    assert abs(_friction_flow(TRACK, 0.4, 0.01, SPEED, 0.1, 0.2, False)[1]) < 1
+    assert abs(friction_flow(TRACK, 0.4, 0.01, SPEED, 0.1, 0.2, True)[1]) > 1
+    assert abs(friction_flow(TRACK, 0.4, 0.01, SPEED, 0.1, 0.2, False)[1]) < 1
 
 
 def test_the_printed_jacobian_is_that_of_a_mass_without_a_motor() -> None:
@@ -155,10 +155,10 @@ def test_the_printed_jacobian_is_that_of_a_mass_without_a_motor() -> None:
     gamma, inertia, rate, arm = 0.8, 0.009522, 0.4, 0.01
     printed = 1 - STEP * (gamma + 2 * TRACK.moment * arm * (SPEED + rate)) / inertia
     driven = TRACK._replace(damping=TRACK.damping + gamma)
-    right = _friction_flow(driven, rate, arm, SPEED, gamma * 0.5, STEP, False)[1]
+    right = friction_flow(driven, rate, arm, SPEED, gamma * 0.5, STEP, False)[1]
     assert abs(printed - right) > 2e-3
     bare = TrackModel(inertia, gamma, TRACK.moment)
-    assert printed == pytest.approx(_friction_flow(bare, rate, arm, SPEED, 0.0, STEP, True)[1])
+    assert printed == pytest.approx(friction_flow(bare, rate, arm, SPEED, 0.0, STEP, True)[1])
 
 
 @pytest.mark.parametrize(

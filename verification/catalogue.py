@@ -228,8 +228,8 @@ def own_cases(folder: Path) -> tuple[list[OwnCase], list[CaseError]]:
 
 def _described(error: Exception, path: Path) -> str:
     """An exception in one line, with the line of the case's own file that it comes from."""
-    own = str(path.absolute())
-    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == own]
+    source = str(path.absolute())
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == source]
     line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
     position = "" if line is None else f"line {line}: "
     return f"{position}{type(error).__name__}: {' '.join(str(error).split())}"

@@ -382,7 +382,7 @@ def derivative_time(scene: Scene, level: Level, defect: str | None = None) -> Ev
     size = len(groups[0]) // len(PERIODS)
     by_period = [[overshooting(group[i : i + size]) for i in range(0, len(group), size)] for group in groups]
     extra_tenfold, extra_hundredfold = (
-        over_period([found - bare for found, bare in zip(each, by_period[0], strict=True)])
+        over_period([fraction - bare for fraction, bare in zip(each, by_period[0], strict=True)])
         for each in by_period[2:]
     )
     without, printed_time, tenfold, hundredfold = fractions = list(map(overshooting, groups))

@@ -87,6 +87,14 @@ def finding_table() -> str:
     )
 
 
+_BLOCKS = {
+    **{kind: f"`{kind}`" for kind in ("law", "disc", "controller")},
+    "measured": "masses: `controller`, `plant`",
+    "strategy": "masses: `controller`",
+    "plant": "masses: `plant`",
+}
+
+
 def block_table() -> str:
     """Variables of the exported blocks."""
     heads = ("block", "variable", "side", "unit", "from", "to", "meaning")
@@ -94,15 +102,18 @@ def block_table() -> str:
         heads,
         [
             (
-                f"`{kind}`",
-                f"`{each['name'].replace('#', 'a')}`" + (", ..." if "#" in each["name"] else ""),
-                "in" if each.get("input") else "out",
+                label,
+                f"`{each['name'].replace('#', each.get('letters', 'a')[0])}`"
+                + (", ..." if "#" in each["name"] else ""),
+                "in" if each.get("input") else "in, out" if kind == "measured" else "out",
                 each["range"].get("unit", "-"),
                 each["range"].get("min", "0"),
                 each["range"].get("max", "1").replace("MOST", "largest"),
-                each["description"].replace("#", "A").replace("MOST", "the largest fill ratio"),
+                each["description"]
+                .replace("#", each.get("letters", "A")[0])
+                .replace("MOST", "the largest fill ratio"),
             )
-            for kind in ("law", "disc", "controller")
+            for kind, label in _BLOCKS.items()
             for each in declared()[kind]
         ],
     )

@@ -351,9 +351,17 @@ def declared() -> dict[str, Any]:
 
 
 def variables_of(
-    kind: Kind, index_of: Callable[[str, int | None], int], *, most: float = 0.0, chambers: int = 2
+    kind: Kind | Literal["measured"],
+    index_of: Callable[[str, int | None], int],
+    *,
+    most: float = 0.0,
+    chambers: int = 2,
+    inputs: bool = False,
 ) -> tuple[Variable, ...]:
-    """Variables as declared. Args: `index_of`: index by name of the offset and, if any, chamber."""
+    """Variables as declared.
+
+    Args: `index_of`: index by name of the offset and, if any, chamber. `inputs`: default of their `input`.
+    """
     variables = []
     for each in declared()[kind]:
         limits = {key: text.replace("MOST", number_text(most)) for key, text in each["range"].items()}
@@ -364,7 +372,7 @@ def variables_of(
                 Variable(
                     name=each["name"].replace("#", letter or "").lower(),
                     kind=each["kind"],
-                    input=each.get("input", False),
+                    input=each.get("input", inputs),
                     index=index_of(each["place"], number if letter else None),
                     description=description.replace("#", letter or ""),
                     range=limits,

@@ -140,6 +140,14 @@ def _block(
     entry = control if kind == "strategy" else run_plant
     flat, layout = Flattening.of(entry, settings, row), Layout.of(row)
     start = numbers_of(row)
+
+    def index_of(path: str, part: int | None) -> int:
+        return layout.index(path.replace("#", str(part)))
+
+    measured = variables_of("measured", index_of, inputs=kind == "strategy")
+    others = variables_of(kind, index_of)
+    # Of one type inputs come first.
+    variables = sorted((*measured, *others), key=lambda each: (each.kind != "Real", not each.input))
     return Block(
         kind=kind,
         title=title,
@@ -151,7 +159,7 @@ def _block(
         modules=(),
         steps=entry.__name__,
         timed=True,
-        variables=variables_of(kind, lambda path, part: layout.index(path.replace("#", str(part)))),
+        variables=tuple(variables),
         period=scene.sensor.step,
         flat=flat.source,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from functools import cache
@@ -18,7 +19,7 @@ from scipy.linalg import expm, solve_continuous_are
 
 import ringbalance as rb
 from ringbalance.cli import main
-from ringbalance.controller.eccentric_mass.memory import FRICTION, POSITIONING, REST
+from ringbalance.controller.eccentric_mass.memory import BALANCED, FRICTION, POSITIONING, REST
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import Machine, measure, sensor_noise
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
@@ -239,3 +240,16 @@ def test_matrices_and_gains_are_those_of_the_equations(name: str) -> None:
     ]
     assert set(loop.transition.ravel()) <= set(values)
     assert set(loop.transition.ravel()) <= set(strategy_block(scene).constants)
+
+
+@needs_compiler
+def test_the_example_of_the_page_balances(tmp_path: Path) -> None:
+    scene, page = scene_of("washing_machine"), HERE.parents[1] / "docs/export.md"
+    (code,) = re.findall(r"```c\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    files = {**c_files(strategy_block(scene), "ctrl"), **c_files(plant_block(scene), "plant"), "main.c": code}
+    for file, text in files.items():
+        (tmp_path / file).write_text(text)
+    command = ["gcc", *WARNINGS, "-O2", "main.c", "ctrl.c", "plant.c", "-lm", "-o", "main"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    ran = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True)
+    assert ran.stdout == f"stage {REST}, cause {BALANCED}\n"

@@ -17,6 +17,7 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, 
 from ringbalance.physics.sloshing import resonant_fills, sloshing_response
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
+from ringbalance.verification.cases.driven_statements import limit_cycle, optimal, undisturbed
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 RPM = math.pi / 30
@@ -99,6 +100,20 @@ def test_where_friction_holds_the_masses(rotor: EccentricScene) -> None:
     agrees(page, r"below ([\d.]+) degrees the whole run-up stays below 10 mm", math.degrees(error))
     slow = math.sqrt(rotor.masses.guide_radius * 2 * RPM / FRICTION_ARM) / RPM
     agrees(page, r"(\d+) rpm for 2 rpm/s", slow)
+
+
+def test_what_the_paper_on_eccentric_masses_only_states(rotor: EccentricScene) -> None:
+    page = "eccentric-masses.md"
+    still, cycle, law = (f(rotor, "light").numbers for f in (undisturbed, limit_cycle, optimal))
+    lengths = [1e3 * still[name] for name in ("before", "least", "most", "least_unequal")]
+    pattern = r"from ([\d.]+) mm to ([\d.]+) to ([\d.]+) mm with equal friction.*? falls to ([\d.]+) mm"
+    agrees(page, pattern, *lengths)
+    agrees(page, r"pair loop leaves ([\d.]+) %", 100 * still["paired"])
+    swing = [1e3 * cycle[name] for name in ("least", "most", "locked")]
+    agrees(page, r"([\d.]+) turns a minute: (\d+) to (\d+) mm, locked (\d+) mm", cycle["rate"], *swing)
+    less = [100 * (1 - law[name]) for name in ("vibration", "energy")]
+    pattern = r"([\d.]+) times its gain of the rate has (\d+) % less vibration and (\d+) % less energy"
+    agrees(page, pattern, law["gain"], *less)
 
 
 def test_waves_on_the_paper_s_disc(paper_scene: Scene) -> None:

@@ -49,7 +49,6 @@ _SHARP_EDGE_DEG: Final = 40.0
 """Angle between faces of a chamber from which their edge is drawn."""
 _CIRCLE_STEPS: Final = 480
 _SURFACE: Final = "dataset_surface"
-_VIRIDIS: Final = colormaps["viridis"]
 _WATER: Final = ListedColormap(colormaps["Blues"](np.linspace(0.28, 1.0, 256)))
 
 
@@ -189,7 +188,7 @@ def _draw_pressure(plotter: Any, job: Record, liquid: Any, theme: _Theme) -> _Le
     back, front = (liquid.clip(normal="z", origin=(0, 0, 0), invert=side) for side in (True, False))
     for part in (back, front.clip(normal="y", origin=(0, 0, 0), invert=False)):
         surface = part.extract_surface(algorithm=_SURFACE)
-        _add_field(plotter, surface, "pressure", _VIRIDIS, high)
+        _add_field(plotter, surface, "pressure", _WATER, high)
         lines = surface.contour(np.linspace(0, high, 9)[1:-1], scalars="pressure")
         plotter.add_mesh(lines, color="white", line_width=2.4, opacity=0.6)
     edges = job["walls"].extract_feature_edges(_SHARP_EDGE_DEG, boundary_edges=False, manifold_edges=False)
@@ -201,10 +200,10 @@ def _draw_pressure(plotter: Any, job: Record, liquid: Any, theme: _Theme) -> _Le
     shallow = float(np.hypot(liquid.points[:, 0], liquid.points[:, 1]).min())
     labels = [
         _Label(text="outer wall", point=_polar(outer, 0.45 * half, 0.1 * width), shift=(48, 88)),
-        _Label(text="free surface", point=_polar(shallow, 0.55 * half, width / 2), shift=(-100, -120)),
+        _Label(text="free surface", point=_polar(shallow, 0.55 * half, width / 2), shift=(-40, -140)),
         _Label(text="gas", point=_polar(0.75 * inner + 0.25 * outer, 0.0, width / 2)),
     ]
-    return _Lettering(labels=labels, title="pressure in MPa", colours=_VIRIDIS, high=high)
+    return _Lettering(labels=labels, title="pressure in MPa", colours=_WATER, high=high)
 
 
 def _add_field(plotter: Any, surface: Any, name: str, colours: Colormap, high: float) -> None:

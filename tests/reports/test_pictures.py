@@ -60,10 +60,10 @@ def test_a_picture_shows_something_on_the_ground_of_its_page(plotted: Path, name
 @needs_opengl
 def test_the_colour_bar_runs_from_end_to_end(plotted: Path) -> None:
     image = pixels(plotted / "figures" / "pressure-light.png")
-    # Viridis: dark violet below, yellow on top.
+    # Pale blue below, dark blue on top, as in the picture of the disc.
     bottom, top = image[round(0.82 * PICTURE[1]) - 6, 60], image[round(0.24 * PICTURE[1]) + 6, 60]
-    assert bottom == pytest.approx([68, 1, 84], abs=8)
-    assert top == pytest.approx([253, 231, 37], abs=8)
+    assert bottom == pytest.approx([186, 214, 235], abs=8)
+    assert top == pytest.approx([8, 48, 107], abs=8)
 
 
 @needs_opengl

@@ -24,13 +24,18 @@ AS_SMALL: Final = 0.01
 """Relative difference in size below which two designs count as equal: resolution of the search."""
 _MAX_JUDGED: Final = 10
 """Number of judged designs of a list after which no further pair is judged."""
-_MAX_ROUNDS: Final = 6
+_MAX_ROUNDS: Final = 4
 """Largest number of rounds; two designs are judged in each."""
-_STEP_SIGMA: Final = 0.06
-"""Standard deviation of the points about the best designs, in the unit cube."""
+_BETWEEN: Final = (0.2, 0.6)
+"""Sizes that are judged at last, as parts of the way from the estimated smallest size to the smallest that
+meets the requirement, on a logarithmic scale."""
+_STEP_SIGMAS: Final = (0.06, 0.03, 0.015)
+"""Standard deviations of the points about the best designs, in the unit cube, and about the best of these."""
 _SIZE_STEPS: Final = (-12, 21)
 """Range of sizes to judge about the expected one, in steps of `AS_SMALL`."""
 _POINTS_PER_SIZE: Final = 24
+_LARGER: Final = 1.05
+"""Ratio of sizes over which the growth of the fraction is taken."""
 _FIRST_LIMIT: Final = 1.05
 """Size to improve on while no design meets the requirement, relative to the expected size."""
 _SIGMA_FACTOR: Final = 1.5
@@ -80,17 +85,71 @@ def judged_designs(hunt: Hunt) -> list[RacedDesign]:
                 judged.append(races.add(chosen, i, Race(grid_point=grid_points[i], judgement=judgement)))
         largest = max(races.space.size(point) for point in chosen.points)
         size = min((each.size for each in judged if each.race.succeeded), default=largest)
+    return _sharpened(races, judged)
+
+
+def _sharpened(races: Races, judged: list[RacedDesign]) -> list[RacedDesign]:
+    """Judged designs with two between the smallest that meets the requirement and one that nearly does.
+
+    The fraction grows with the size of a design, so each judged design, scaled until its fraction would be
+    the required one, estimates the smallest size; the best of them is judged again there.
+    """
+    smallest = min((each for each in judged if each.race.succeeded), key=lambda each: each.size, default=None)
+    slope = 0.0 if smallest is None else growth(races, smallest)
+    if smallest is None or slope <= 0:
+        return judged
+    scaled = [_size_with(races.threshold, each, each.race.judgement.fraction.value, slope) for each in judged]
+    near = judged[int(np.argmin(scaled))]
+    sizes = min(scaled) * (smallest.size / min(scaled)) ** np.array(_BETWEEN)
+    if smallest.size < (1 + AS_SMALL / 2) * sizes[0]:
+        return judged
+    points = races.able(np.array([races.space.sized_at(near.shares, each) for each in sizes]))
+    # Sizes in a drawing have few digits: both may be one.
+    points = points.some([i for i, each in enumerate(points.points) if each not in points.points[:i]])
+    races.report_progress(f"judging designs {len(judged) + 1} and on, about {1e6 * sizes[0]:.4g} ml")
+    judge = partial(judged_design, races.space.hasty, settings=near.race.judgement.settings)
+    for i, judgement in enumerate(deal(races.executor, [partial(judge, each) for each in points.points])):
+        if judgement is not None:
+            race = Race(grid_point=near.race.grid_point, judgement=judgement)
+            judged.append(races.add(points, i, race))
     return judged
 
 
+def enlarged(races: Races, design: RacedDesign, fraction: float) -> RacedDesign | None:
+    """Design that missed the requirement with a fraction of its devices, larger by what that lacks.
+
+    None where its size does not vary further, or the fraction does not grow with it.
+    """
+    slope = growth(races, design)
+    if slope <= 0:
+        return None
+    size = max(_size_with(races.threshold, design, fraction, slope), (1 + AS_SMALL / 2) * design.size)
+    points = races.able(races.space.sized_at(design.shares, size)[np.newaxis])
+    if not points.points or races.space.size(points.points[0]) <= design.size:
+        return None
+    return replace(
+        design,
+        shares=points.shares[0],
+        reach=float(points.reach[0]),
+        point=points.points[0],
+        size=races.space.size(points.points[0]),
+    )
+
+
 def growth(races: Races, best: RacedDesign) -> float:
-    """Derivative of the fraction of devices with respect to the logarithm of the size, from the surface."""
-    shares = next(each.shares for each in races.candidates if each.point == best.point)
-    ends = best.size * np.array([1 - AS_SMALL, 1 + AS_SMALL])
-    points = races.able(np.array([races.space.sized_at(shares, size) for size in ends]))
+    """Growth of the fraction of devices with the logarithm of the size, from the surface, over a step that is
+    long against its errors.
+    """
+    ends = best.size * np.array([1.0, _LARGER])
+    points = races.able(np.array([races.space.sized_at(best.shares, size) for size in ends]))
     fractions = expit(races.surface().logits(races.coordinates(points))[0])
     sizes = [races.space.size(each) for each in points.points]
     return float(np.diff(fractions)[0]) / math.log(sizes[1] / sizes[0]) if len(set(sizes)) == 2 else 0.0
+
+
+def _size_with(required: float, design: RacedDesign, fraction: float, slope: float) -> float:
+    """Size, m^3, at which a design would serve the required fraction. Args: `slope`: as from `growth`."""
+    return design.size * math.exp((required - fraction) / slope)
 
 
 def _most_promising_by_size(
@@ -108,16 +167,20 @@ def _most_promising_by_size(
     if not steps.size:
         return races.points.some([]), nothing, nothing, nothing
     parents = races.parents(lambda points: surface.logits(races.coordinates(points))[0], size)
-    points = races.cloud(parents, _STEP_SIGMA, np.repeat(steps, _POINTS_PER_SIZE))
-    if not points.points:
-        return points, nothing, nothing, nothing
-    sizes = np.array([races.space.size(point) for point in points.points])
-    logits, sigmas = surface.logits(races.coordinates(points))
-    best = [
-        max(np.flatnonzero(sizes == each).tolist(), key=lambda i: logits[i])
-        for each in np.unique(sizes[sizes <= below])
-    ]
-    return points.some(best), sizes[best], logits[best], sigmas[best]
+    points = races.points.some([])
+    for step in _STEP_SIGMAS:
+        points = points.joined(races.cloud(parents, step, np.repeat(steps, _POINTS_PER_SIZE)))
+        sizes = np.array([races.space.size(point) for point in points.points])
+        if not (sizes <= below).any():
+            return points.some([]), nothing, nothing, nothing
+        logits, sigmas = surface.logits(races.coordinates(points))
+        best = [
+            max(np.flatnonzero(sizes == each).tolist(), key=lambda i: logits[i])
+            for each in np.unique(sizes[sizes <= below])
+        ]
+        points, sizes, logits, sigmas = points.some(best), sizes[best], logits[best], sigmas[best]
+        parents = points.shares
+    return points, sizes, logits, sigmas
 
 
 def _judge_listed(hunt: Hunt) -> list[RacedDesign]:

@@ -6,6 +6,7 @@ Candidates of the search are judged as in `tune`, on devices that selected no de
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -21,7 +22,7 @@ from ringbalance.controller.judging.holding import Endurance, endurance
 from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE, Judgement
 from ringbalance.controller.judging.ranking import Ranking, ranked
 from ringbalance.design.axes import Point
-from ringbalance.design.closing import growth, judged_designs
+from ringbalance.design.closing import AS_SMALL, enlarged, growth, judged_designs
 from ringbalance.design.hunt import Static, hunt
 from ringbalance.design.races import RacedDesign, Races, deal
 from ringbalance.design.racing import DEVICES, devices_row, judged_design
@@ -87,8 +88,8 @@ class Design(PresentedResult):
     """Size, m^3, of the next smaller judged design, and the fraction of devices that it serves; None: no
     smaller design was judged, or the size does not vary."""
     doubt: float | None
-    """Relative half-width (95 %) of the size by the random choice of devices; None: the fraction of devices
-    does not grow with the size, or the size does not vary."""
+    """Relative half-width (95 %) of the size by the random choice of devices and the search's resolution;
+    None: the fraction of devices does not grow with the size, or the size does not vary."""
     tried: tuple[RacedDesign, ...]
     """Designs that ran on a block of devices or more, each with its last judgement."""
     front: tuple[RacedDesign, ...]
@@ -161,19 +162,31 @@ def run_design(
             """Size, m^3; if no size varies, energy of the gas, J."""
             return each.size if space.sized else float(np.nanmedian(each.race.judgement.outcomes.energy))
 
-        promising = sorted((each for each in judged if each.race.succeeded), key=order)[:_MAX_VERDICTS]
+        promising = sorted((each for each in judged if each.race.succeeded), key=order)
         # If none meets the requirements, the design that serves most devices.
-        for best in promising or sorted(judged, key=lambda each: -each.race.judgement.fraction.value)[:1]:
+        queue = promising or sorted(judged, key=lambda each: -each.race.judgement.fraction.value)[:1]
+        for _ in range(_MAX_VERDICTS):
+            if not queue:
+                break
+            best = queue.pop(0)
             report_progress("the verdict, and what changes of it would do")
             settings = best.race.judgement.settings
             judge = partial(judged_design, scene, best.point, settings=settings, verdict=True)
             effects, judgement = _effects(space, best, settings, crew, judge)
             if judgement is not None and judgement.verdict == MET:
                 break
+            # The next one in order, or the same one larger if that is smaller.
+            larger = None
+            if judgement is not None and space.sized and promising:
+                larger = enlarged(races, best, judgement.fraction.value)
+            if larger is not None and (not queue or larger.size < queue[0].size):
+                queue.insert(0, larger)
         if best is not None and space.sized:
-            # Half-width of the fraction, divided by its growth with the logarithm of the size.
+            # Half-width of the difference of two fractions, divided by the growth with the logarithm of the
+            # size, and the resolution of the search.
             share, rise = best.race.judgement.fraction, growth(races, best)
-            doubt = (share.high - share.low) / 2 / rise if rise > 0 else None
+            apart = (share.high - share.low) / math.sqrt(2.0)
+            doubt = math.hypot(apart / rise, AS_SMALL) if rise > 0 else None
     reach, smaller, ranking, held = None, None, Ranking(), None
     if best is not None:
         reach = row_reach(static_rows(space.scene, [best.point], intervals=False)[0])
@@ -199,7 +212,7 @@ def run_design(
         tried=tuple(
             {
                 repr(each.point): each
-                for each in (*races.candidates, *judged)
+                for each in (*races.candidates, *judged, *([] if best is None else [best]))
                 if each.race.judgement.meets.size >= DEVICES
             }.values()
         ),

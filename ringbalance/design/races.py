@@ -64,6 +64,13 @@ class Points:
         points = [self.points[i] for i in chosen.tolist()]
         return Points(shares=self.shares[chosen], points=points, reach=self.reach[chosen])
 
+    def joined(self, more: Points) -> Points:
+        """Union of these and other points."""
+        shares = np.concatenate([self.shares, more.shares])
+        return Points(
+            shares=shares, points=[*self.points, *more.points], reach=np.append(self.reach, more.reach)
+        )
+
 
 def threshold(required_fraction: float) -> float:
     """Smallest fraction of a verdict's devices whose lower 95 % bound reaches the required fraction."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from unittest.mock import Mock
 
@@ -16,17 +18,20 @@ import numpy as np
 import pytest
 from design_answers import PROBLEMS, compared
 from design_spread import answer
+from scipy.special import expit, logit
 
 import ringbalance as rb
 from ringbalance.controller.balancer import Demand, balancer_of
 from ringbalance.controller.judging.holding import Endurance
 from ringbalance.controller.judging.judge import MOST_DRAWS, judged_all
 from ringbalance.controller.judging.search import searched
-from ringbalance.design.races import deal, threshold
-from ringbalance.design.racing import near, settings_at
+from ringbalance.design import closing
+from ringbalance.design.closing import _sharpened, enlarged, growth
+from ringbalance.design.races import RacedDesign, Races, deal, threshold
+from ringbalance.design.racing import Race, near, settings_at
 from ringbalance.design.space import Space
 from ringbalance.design.static import row_reach, static_rows
-from ringbalance.results.requirements import MET, OPEN, Proportion
+from ringbalance.results.requirements import MET, MISSED, OPEN, Proportion
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 
@@ -316,6 +321,79 @@ def test_an_error_in_a_file_of_valves_names_its_cell(tmp_path: Path) -> None:
         rb.SceneError, match=r'v\.csv: line 2, column "conductance" = "0.3 mm": "mm" is a unit'
     ):
         rb.find_design(rb.load_scene(file))
+
+
+@dataclass(frozen=True)
+class Line:
+    """Races of discs that differ in width alone, of which the logit of the fraction is known."""
+
+    races: Races
+    steepness: float = 3.0
+
+    @classmethod
+    def of(cls, steepness: float = 3.0) -> Line:
+        space = Space.of(open_scene(("disc.axial_width=14mm:38mm:log", *WIDTHS[1:])))
+        surface = Mock(logits=lambda places: (2.4 + steepness * (places[:, 0] - 0.5), np.zeros(len(places))))
+        common: dict[str, Any] = {"executor": None, "report_progress": lambda _: None, "trials": ()}
+        races = Races(
+            space=space, needed=1e-6, least=0.9, threshold=0.92, random=np.random.default_rng(0), **common
+        )
+        races.fitted = surface
+        return cls(races=races, steepness=steepness)
+
+    def fraction(self, size: float) -> float:
+        """Fraction of a disc of a size, m^3."""
+        share = math.log(size / self.design(0.0).size) / math.log(38 / 14)
+        return float(expit(2.4 + self.steepness * (share - 0.5)))
+
+    def judgement(self, size: float) -> Any:
+        fraction = self.fraction(size)
+        verdict = MET if fraction >= self.races.threshold else MISSED
+        return SimpleNamespace(fraction=SimpleNamespace(value=fraction), verdict=verdict, settings={})
+
+    def design(self, share: float, judgement: Any = None) -> RacedDesign:
+        points = self.races.able(np.array([[share, 0.5, 0.5]]))
+        race = Race(grid_point=None, judgement=judgement)
+        size = self.races.space.size(points.points[0])
+        return RacedDesign(shares=points.shares[0], reach=1.0, point=points.points[0], size=size, race=race)
+
+    def judged(self, share: float) -> RacedDesign:
+        return self.design(share, self.judgement(self.design(share).size))
+
+
+def test_a_design_that_misses_on_fresh_devices_follows_larger_by_what_it_lacks() -> None:
+    line = Line.of()
+    design = line.design(0.5)
+    slope = (line.fraction(1.05 * design.size) - line.fraction(design.size)) / math.log(1.05)
+    # Widths have three digits, as in a drawing.
+    assert growth(line.races, design) == pytest.approx(slope, rel=0.06)
+    larger = enlarged(line.races, design, 0.9)
+    assert larger is not None
+    assert larger.size == pytest.approx(design.size * math.exp(0.02 / growth(line.races, design)), rel=0.005)
+    assert larger.point == {**design.point, "disc.axial_width": larger.point["disc.axial_width"]}
+    # A fraction that suffices as it was judged first is no reason to grow by less than can be drawn.
+    least = enlarged(line.races, design, 0.95)
+    assert least is not None
+    assert 1.002 < least.size / design.size < 1.01
+    assert enlarged(line.races, line.design(1.0), 0.9) is None
+    assert enlarged(Line.of(steepness=-1.0).races, design, 0.9) is None
+
+
+def test_the_last_designs_judged_lie_between_one_that_misses_and_one_that_meets(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Without them the answer is the next size that happened to be tried, here 3 % too large."""
+    line = Line.of()
+    smallest = line.design(0.0).size * (38 / 14) ** (0.5 + (float(logit(0.92)) - 2.4) / line.steepness)
+    at = math.log(smallest / line.design(0.0).size) / math.log(38 / 14)
+    judged = [line.judged(at - 0.02), line.judged(at + 0.03)]
+    assert [each.race.succeeded for each in judged] == [False, True]
+    monkeypatch.setattr(
+        closing, "judged_design", lambda _scene, point, **_: line.judgement(line.races.space.size(point))
+    )
+    best = min(each.size for each in _sharpened(line.races, judged) if each.race.succeeded)
+    assert judged[1].size > 1.025 * smallest
+    assert smallest <= best <= 1.012 * smallest
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ _STEP_SIGMAS: Final = (0.06, 0.03, 0.015)
 _SIZE_STEPS: Final = (-12, 21)
 """Range of sizes to judge about the expected one, in steps of `AS_SMALL`."""
 _POINTS_PER_SIZE: Final = 24
-_LARGER: Final = 1.05
+_GROWTH_FACTOR: Final = 1.05
 """Ratio of sizes over which the growth of the fraction is taken."""
 _FIRST_LIMIT: Final = 1.05
 """Size to improve on while no design meets the requirement, relative to the expected size."""
@@ -140,7 +140,7 @@ def growth(races: Races, best: RacedDesign) -> float:
     """Growth of the fraction of devices with the logarithm of the size, from the surface, over a step that is
     long against its errors.
     """
-    ends = best.size * np.array([1.0, _LARGER])
+    ends = best.size * np.array([1.0, _GROWTH_FACTOR])
     points = races.able(np.array([races.space.sized_at(best.shares, size) for size in ends]))
     fractions = expit(races.surface().logits(races.coordinates(points))[0])
     sizes = [races.space.size(each) for each in points.points]

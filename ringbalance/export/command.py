@@ -50,6 +50,11 @@ def export(options: SimpleNamespace) -> int:
     kind = options.block or kinds[0]
     if kind not in kinds:
         raise _refusal("--block", kind, f"a scene of {scene.balancer} has none", " or ".join(kinds))
+    if cross and scene.balancer == "eccentric_mass":
+        problem = "blocks of eccentric masses need sin and cos of each system's own library"
+        raise _refusal(
+            "--all-systems", True, problem, "no such option, or a build from the unit's sources there"
+        )
     if options.to == "csv" and kind != kinds[0]:
         raise _refusal("--block", kind, f"csv is a table of the {kinds[0]}", f"--block {kinds[0]}")
     called = identifier(options.name or options.scene.stem + ("" if kind == "law" else f"_{kind}"))

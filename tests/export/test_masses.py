@@ -186,6 +186,7 @@ def test_a_unit_has_the_outputs_of_the_block(tmp_path: Path, version: Version) -
         ({}, ["--to", "c", "--block", "disc"], '--block = "disc": a scene of eccentric_mass has none'),
         ({}, ["--to", "csv", "--block", "plant"], "csv is a table of the controller"),
         ({}, ["--to", "csv", "--points", "5"], "--points = 5"),
+        ({}, ["--to", "fmi2", "--all-systems"], "--all-systems = true"),
     ],
 )
 def test_what_cannot_be_exported_is_one_sentence(

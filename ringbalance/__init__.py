@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from ringbalance.controller.simulation import Simulation as Simulation
     from ringbalance.controller.stepped import scene_controller as scene_controller
     from ringbalance.design.designing import Design as Design
+    from ringbalance.design.mass_design import MassDesign as MassDesign
     from ringbalance.design.sweep import Sweep as Sweep
     from ringbalance.designs import objective as objective
     from ringbalance.designs import sweep as sweep
@@ -123,6 +124,7 @@ _NAMES = {
     "controller.stepped": ("scene_controller",),
     "controller.judging.tuning": ("Tuning",),
     "design.designing": ("Design",),
+    "design.mass_design": ("MassDesign",),
     "design.sweep": ("Sweep",),
     "designs": ("objective", "sweep"),
     "face": (

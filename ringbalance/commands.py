@@ -249,7 +249,8 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         """The smallest disc, with bore, pressure, valve and settings, that meets the requirement of a scene.
 
         Args:
-            scene: the scene file, with [requirement] and [design].
+            scene: the scene file, with [requirement] and [design]; of eccentric masses the lightest,
+                with guide radius, gear and motor.
             in_place: keep the disc's size, and choose bore, pressure, siphon crest, gas hole and valve;
                 [design] may be left out, and a later report shows the answer.
             save: write the scene of the design, with its settings.

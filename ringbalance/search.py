@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Executor
+from typing import TYPE_CHECKING
 
 from ringbalance.design.design_rows import design_document, design_rows
 from ringbalance.design.designing import Design, run_design
@@ -12,6 +13,10 @@ from ringbalance.interface import checked
 from ringbalance.results.result import Presentation
 from ringbalance.scene import AnyScene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.registry import imported
+
+if TYPE_CHECKING:
+    from ringbalance.design.mass_design import MassDesign
 
 
 @checked
@@ -22,8 +27,10 @@ def find_design(
     executor: Executor | None = None,
     workers: int = 1,
     progress: Callable[[str], None] | None = None,
-) -> Design:
+) -> Design | MassDesign:
     """Design what a scene's table [design] leaves open: the smallest disc that meets [requirement].
+
+    Of eccentric masses the lightest, with guide radius, gear and motor (`MassDesign`).
 
     Args: `in_place`: True to keep the disc's size and choose bore, pressure, siphon crest, gas hole and valve
         alone, within what [design] states or usual ranges; a report then shows the answer. `executor`: any
@@ -39,6 +46,9 @@ def find_design(
         >>> design.judgement.verdict
         'met'
     """
+    if scene.balancer == "eccentric_mass" and not in_place:
+        design_masses: Callable[..., MassDesign] = imported("ringbalance.design.mass_design:design_masses")
+        return design_masses(scene, executor=executor, workers=workers, progress=progress)
     searched = within_disc(liquid_ring_scene(scene)) if in_place else scene
     design = run_design(
         searched,

@@ -16,7 +16,16 @@ import pytest
 import ringbalance as rb
 from ringbalance.scene import registry
 
-LONG: Final = {"Comparison", "Design", "Extremes", "Tuning", "extremes", "find_design", "write_report"}
+LONG: Final = {
+    "Comparison",
+    "Design",
+    "Extremes",
+    "MassDesign",
+    "Tuning",
+    "extremes",
+    "find_design",
+    "write_report",
+}
 """Whose examples take long, or run what the example of the function that makes them runs."""
 NAMES: Final = [
     pytest.param(name, marks=pytest.mark.heavy if name in LONG else ())

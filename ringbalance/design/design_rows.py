@@ -12,6 +12,7 @@ import numpy as np
 
 from ringbalance.controller.balancer import REQUIRED_FRACTION, Demand
 from ringbalance.controller.judging.judge import Judgement, plain_settings
+from ringbalance.controller.judging.ranking import Ranking
 from ringbalance.controller.judging.tuning import (
     if_exact,
     reported_findings,
@@ -27,7 +28,7 @@ from ringbalance.scene.arrays import finite
 from ringbalance.scene.describe import setting_text
 from ringbalance.scene.origins import raw_value_at
 
-_CODES: Final = {MET: "design_met", MISSED: "design_missed", OPEN: "design_open"}
+CODES: Final = {MET: "design_met", MISSED: "design_missed", OPEN: "design_open"}
 _EDGES: Final = {
     True: ("design_edge", "design_edge_default"),
     False: ("design_edge_missed", "design_edge_missed_default"),
@@ -136,7 +137,7 @@ def _findings(design: Design) -> Iterator[Finding]:
         yield from _refusals(static.refusals, static.points)
         return
     changes = {path: value for path, value in design.point.items() if isinstance(value, float | int | str)}
-    code = _CODES[judgement.verdict] + if_exact(design.given, judgement)
+    code = CODES[judgement.verdict] + if_exact(design.given, judgement)
     yield Finding(code=code, values=judgement.sentence_values, change=changes)
     times = judgement.settling_times
     if times["p50"] is not None:
@@ -155,7 +156,7 @@ def _findings(design: Design) -> Iterator[Finding]:
         if design.doubt is not None:
             yield Finding(code="design_doubt", values={"doubt": design.doubt})
     else:
-        yield from _misses(design, judgement)
+        yield from misses(judgement, design.ranking)
     # Keys at an end of their range, and `vary` with a wider range if the end is a default.
     code, default = _EDGES[design.succeeded]
     for path, ends in (pair for axis in design.space.axes for pair in axis.ranges.items()):
@@ -180,7 +181,7 @@ def _refusals(texts: Sequence[str], points: int) -> Iterator[Finding]:
         yield Finding(code="design_refused", values={**values, "text": text})
 
 
-def _misses(design: Design, judgement: Judgement) -> Iterator[Finding]:
+def misses(judgement: Judgement, ranking: Ranking) -> Iterator[Finding]:
     """Findings on demands that too few devices meet, the worst first, each with the value reached."""
     parts = (judgement.required_fraction, 0.5)
     order = sorted(judgement.demands, key=lambda each: judgement.fraction_of(each).value)
@@ -200,7 +201,7 @@ def _misses(design: Design, judgement: Judgement) -> Iterator[Finding]:
         yield Finding(code="design_demand" if math.isfinite(reached) else "design_demand_open", values=values)
     if causes := judgement.causes:
         yield Finding(code="tuned_causes", values={"causes": causes})
-    yield from design.ranking.findings()
+    yield from ranking.findings()
 
 
 def _reached(judgement: Judgement, demand: Demand, fraction: float) -> float:

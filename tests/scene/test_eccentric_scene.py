@@ -42,6 +42,7 @@ RECORDS = {
     "supervisor": control_records.Supervisor,
     "run": RunSettings,
     "requirement": scene_records.EccentricRequirement,
+    "design": scene_records.EccentricDesign,
 }
 
 

@@ -25,7 +25,14 @@ from ringbalance.controller.balancer import (
     Settings,
     settles_within,
 )
-from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, EccentricDevice, device, on_rotor
+from ringbalance.controller.eccentric_mass.devices import (
+    FITTED,
+    PHASE,
+    EccentricDevice,
+    device,
+    imbalance_ratios,
+    on_rotor,
+)
 from ringbalance.controller.eccentric_mass.memory import REST, STAGE_NAMES
 from ringbalance.controller.eccentric_mass.outcome import EccentricOutcome
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
@@ -47,6 +54,7 @@ from ringbalance.controller.eccentric_mass.scene_records import (
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.static_answers import (
     largest_whirl_per_imbalance,
+    required_residual,
     static_quantities,
     whirl_per_imbalance,
 )
@@ -70,8 +78,6 @@ _REST_TIMES: Final = 4.0
 """Length of the runs of a search, over the time to rest of the scene's own run."""
 _REMEDY_DEVICES: Final = 8
 """Number of devices whose runs decide which remedies are tried."""
-_SIZING_DEVICES: Final = 256
-"""Number of devices whose imbalances, without runs, size the masses."""
 
 
 class EccentricMassBalancer(Balancer):
@@ -184,13 +190,14 @@ class EccentricMassBalancer(Balancer):
         until = (scene.steady_until or scene.run.time_limit) - scene.supervisor.start
         time = until if requirement.settling_time is None else requirement.settling_time
         settles = settles_within(time, stated=requirement.settling_time is not None)
-        if requirement.residual is None:
+        allowed = required_residual(scene)
+        if allowed is None:
             return (settles,)
         residual = Demand(
             code="residual",
             outcome="final_amplitude",
             sense=AT_MOST,
-            required=requirement.residual,
+            required=allowed,
             unit="m",
             stated=True,
         )
@@ -218,10 +225,7 @@ class EccentricMassBalancer(Balancer):
     def remedies(self) -> tuple[Remedy, ...]:
         """Parts of another size, and changes suited to the ways in which runs of some devices end."""
         nominal, sample = (self.run({}, draws) for draws in (AS_GIVEN, Draws.first(_REMEDY_DEVICES)))
-        scenes = (device(self.scene, number, self._rotors).scene for number in range(_SIZING_DEVICES))
-        # Ratio of the imbalance to the largest that the masses cancel.
-        ratios = [each.imbalance.mass * each.imbalance.radius / reach_of(each) for each in scenes]
-        return tuple(remedies_of(self.scene, nominal, sample, ratios))
+        return tuple(remedies_of(self.scene, nominal, sample, imbalance_ratios(self.scene, self._rotors)))
 
     def drawn_input(self, name: str) -> DrawnInput:
         """Kind of an input; no measurement is proposed for the direction of an imbalance."""

@@ -16,6 +16,7 @@ from typing import Final
 
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, EccentricScene, SpeedPoint
+from ringbalance.controller.eccentric_mass.targets import reach_of
 from ringbalance.controller.rotor import CommonRotor, Rotors
 from ringbalance.scene.draws import deviates, quantiles
 from ringbalance.scene.origins import InputUncertainty, moved_at
@@ -23,6 +24,7 @@ from ringbalance.scene.uncertain import NORMAL_95
 
 ASSUMED_AMPLITUDE: Final = 0.05
 """Relative expanded uncertainty (95 %) of an imbalance without a stated one; liquid rings have the same."""
+_SIZING_DEVICES: Final = 256
 PHASE: Final = "imbalance.phase"
 FITTED: Final = "fitted together, direction"
 _SIZE: Final = ("imbalance.mass", "imbalance.radius")
@@ -79,6 +81,12 @@ def device(scene: EccentricScene, number: int, rotors: Rotors | None = None) -> 
         turn = half_range * (2.0 * inputs[PHASE] - 1.0)
         plant = moved_at(plant, PHASE, lambda angle: angle + turn)
     return EccentricDevice(scene=plant if rotors is None else on_rotor(plant, rotors(number)), inputs=inputs)
+
+
+def imbalance_ratios(scene: EccentricScene, rotors: Rotors | None = None) -> list[float]:
+    """Imbalance over the largest that the masses cancel, of many devices without a run."""
+    scenes = (device(scene, number, rotors).scene for number in range(_SIZING_DEVICES))
+    return [each.imbalance.mass * each.imbalance.radius / reach_of(each) for each in scenes]
 
 
 def _scaled(value: float, exponent: float) -> float:

@@ -19,6 +19,7 @@ from ringbalance.controller.eccentric_mass.outcome import EccentricOutcome
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.controller.eccentric_mass.static_answers import required_residual
 from ringbalance.scene.origins import raw_value_at, value_at
 
 _MAX_KINDS: Final = 4
@@ -122,7 +123,7 @@ def remedies_of(
                 finer = {path: factor * value for path, value in values.items() if value > 0}
                 yield Remedy(code=prefix + code, changes=finer)
     # A limit at the required residual; or at what runs reach, if below the vibration before balancing.
-    limit, residual = scene.supervisor.limit, scene.requirement.residual
+    limit, residual = scene.supervisor.limit, required_residual(scene)
     reached = float(np.max(sample.final_amplitude))
     if residual is not None and residual < limit:
         yield Remedy(code="limit", changes={"supervisor.limit": residual})

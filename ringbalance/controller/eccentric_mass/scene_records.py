@@ -29,10 +29,12 @@ from ringbalance.scene.keys.fields import (
     Angle,
     Angles,
     Arms,
+    BalanceGrade,
     Damping,
     Inertia,
     Length,
     Mass,
+    OneLine,
     PositiveLength,
     PositiveMass,
     PositiveTime,
@@ -42,7 +44,9 @@ from ringbalance.scene.keys.fields import (
     Teeth,
     Turn,
     Velocity,
+    each_of,
     quantity,
+    whole,
 )
 from ringbalance.scene.keys.schema import ORIGIN, Schema, TableSchema
 from ringbalance.scene.kinds import (
@@ -161,6 +165,55 @@ class Motor:
 
 
 @dataclass(frozen=True, kw_only=True)
+class MotorAtHand:
+    """A motor that [design] may choose; it travels with its mass, which is no lighter."""
+
+    name: Annotated[OneLine, needed("as it is ordered")]
+    torque_constant: Annotated[float, quantity("torque_constant", POSITIVE), needed("K_i")]
+    resistance: Annotated[float, quantity("resistance", POSITIVE), needed("R_m of the winding")]
+    inertia: Annotated[Inertia, needed("of its rotor")]
+    mass: Annotated[PositiveMass, needed("of the motor")]
+    maximum_voltage: Annotated[float, quantity("voltage", POSITIVE), needed("of the motor or its supply")]
+    back_emf_constant: Annotated[
+        float | None,
+        quantity("voltage_per_speed", NOT_NEGATIVE),
+        unused("as large as torque_constant, in SI", "K_m"),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class EccentricDesign:
+    """Choices of `ringbalance design`, which sizes masses and gears in any case."""
+
+    guide_radius: Annotated[
+        PositiveLength | None,
+        unused("the track keeps its radius", "largest guide radius that space leaves"),
+    ] = None
+    mass: Annotated[
+        PositiveMass | None,
+        unused("as heavy as the imbalance needs", "largest mass of each that space leaves"),
+    ] = None
+    motors: Annotated[
+        tuple[MotorAtHand, ...],
+        standard([], "motors at hand; without any, and without `motor_file`, the scene's own stays"),
+        Listed(
+            '[{ name = "M1", torque_constant = "10 mN*m/A", resistance = "2 ohm", inertia = "5 g*cm^2", '
+            'mass = "40 g", maximum_voltage = "12 V" }, ...]'
+            ', or motor_file = "motors.csv" in place of the list'
+        ),
+    ] = ()
+    motor_file: Annotated[
+        OneLine | None,
+        unused("those of `motors`", "a CSV file with the keys of `motors` in its columns, beside the scene"),
+    ] = None
+    teeth: Annotated[
+        tuple[int, ...],
+        each_of(whole(1, 100000), example="[10, 15, 20]"),
+        standard([], "numbers of teeth that gear A may have; without any, the scene's to four times as many"),
+    ] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
 class EccentricSensor:
     """Sensors of vibration and masses: frame, noise and step."""
 
@@ -190,6 +243,12 @@ class EccentricRequirement:
     residual: Annotated[
         PositiveLength | None,
         unused("limit of [supervisor]", "vibration amplitude (zero-to-peak) that may remain at the end"),
+    ] = None
+    grade: Annotated[
+        BalanceGrade | None,
+        unused(
+            "none is required", "balance quality grade of ISO 21940-11, of the rotor at the end of the run"
+        ),
     ] = None
     fraction: Annotated[
         ProperFraction,
@@ -226,6 +285,7 @@ class EccentricScene(SceneFile):
     fine_tuning: FineTuning
     supervisor: Supervisor
     requirement: EccentricRequirement = field(default_factory=EccentricRequirement)
+    design: EccentricDesign = field(default_factory=EccentricDesign)
 
     balancer: ClassVar[str] = "eccentric_mass"
 
@@ -259,6 +319,7 @@ _TABLES = {
     "fine_tuning": TableSchema.of(FineTuning, "the search by trial for a smaller vibration"),
     "supervisor": TableSchema.of(Supervisor, "the order of the stages, and when each ends"),
     "requirement": TableSchema.of(EccentricRequirement, "what is required of the balancer"),
+    "design": TableSchema.of(EccentricDesign, "what `ringbalance design` may choose"),
 }
 ECCENTRIC_MASS = Schema.of(
     _TABLES,

@@ -19,6 +19,7 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.targets import reach_of
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.keys.derivations import permissible_unbalance
 
 _SPEEDS: Final = 400
 """Number of speeds between two corners of the profile; those of the largest vibration are added."""
@@ -40,6 +41,19 @@ def largest_whirl_per_imbalance(scene: EccentricScene, *, after: float = 0.0) ->
 def starting_speed(scene: EccentricScene) -> float:
     """W_0, rad/s."""
     return speed_at(*scene.rotor.profile, scene.supervisor.start)[0]
+
+
+def required_residual(scene: EccentricScene) -> float | None:
+    """Vibration that may remain at the end of the run, m: the smaller of `residual` and that of the grade.
+
+    |alpha(W)| G m_r/W at the last speed W; a rotor that rests in the end has no such grade.
+    """
+    requirement, speed = scene.requirement, abs(speed_at(*scene.rotor.profile, scene.run.time_limit)[0])
+    limits = [] if requirement.residual is None else [requirement.residual]
+    if requirement.grade is not None and speed:
+        left = permissible_unbalance(grade=requirement.grade, mass=scene.rotor.mass, speed=speed)
+        limits.append(whirl_per_imbalance(scene, speed) * left)
+    return min(limits, default=None)
 
 
 def stall_ratio(scene: EccentricScene) -> float | None:

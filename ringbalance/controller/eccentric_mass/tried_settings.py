@@ -10,14 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from ringbalance.controller.eccentric_mass.drive_law import track_model
 from ringbalance.controller.eccentric_mass.memory import FRICTION, IMBALANCE, STAGE_NAMES
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.supervisor import LEAST_DRIVE_TIME_S
 from ringbalance.controller.trials import Point, SearchAxis, Trials, rounded
-from ringbalance.scene.origins import value_at
+from ringbalance.scene.origins import value_at, with_values_at
 
 _MARGINS: Final = "margins of the drives"
 _WEIGHT: Final = "lqr.state_weight"
@@ -27,6 +29,14 @@ _FACTORS: Final = {
     "friction_filter.drive_speed": ((1 / 2, 1.0, 2.0, 4.0), (1,)),
 }
 """Factors on the scene's value, and the indices of those that are tried first, by key."""
+_MOVE_PACE: Final = 10.0
+_SPEED_PACE: Final = 50.0
+_PAIR_PACE: Final = 2.0
+"""Paces of regulator, speed and pair control for any size, rad/s: those of the bundled scenes."""
+_FRICTION_ANGLE_RAD: Final = 0.2
+"""Distance from its goal at which the regulator overcomes all friction, uncompensated."""
+_FRICTION_FACTOR: Final = 1.5
+"""Torque of the speed control at standstill over the friction, at the drive speed."""
 _GATES: Final = {IMBALANCE: "imbalance_filter.gate", FRICTION: "friction_filter.gate"}
 """Gate by the stage that it ends."""
 _GATE_FACTORS: Final = ((1.0, 2.0, 4.0), (0,))
@@ -61,6 +71,24 @@ def trials_of(scene: EccentricScene, nominal: EccentricRun) -> Trials:
         return None if stiffer else changes
 
     return Trials(kind=scene.balancer, axes=tuple(axes), settings=settings)
+
+
+def sized_gains(scene: EccentricScene) -> dict[str, float]:
+    """Gains by key, SI, for the inertia J of the drives, with their margins, and a sufficient drive speed.
+
+    q = r k_p^2 with k_p = J w^2, B_add gamma = J w_s with fixed paces w and w_s, or more, for the friction.
+    """
+    plant, inertia, keys = PlantParameters.of(scene), track_model(scene).inertia, scene.friction_filter
+    friction = max(plant.friction_arm) * plant.moment * scene.rotor.speed_profile[0].speed ** 2
+    stiffness = max(inertia * _MOVE_PACE**2, friction / _FRICTION_ANGLE_RAD)
+    torque = max(inertia * _SPEED_PACE, _FRICTION_FACTOR * friction / keys.drive_speed)
+    gains = {
+        _WEIGHT: scene.lqr.input_weight * stiffness**2,
+        "friction_filter.speed_gain": torque / plant.drive_gain,
+        "friction_filter.pair_gain": _PAIR_PACE * torque / plant.drive_gain,
+    }
+    changes = {**gains, **advised(with_values_at(scene, gains))}
+    return {path: rounded(value) for path, value in changes.items()}
 
 
 def _gates(scene: EccentricScene, nominal: EccentricRun) -> Iterator[str]:

@@ -26,7 +26,7 @@ from ringbalance.reports.figure import (
     line,
     logarithmic,
 )
-from ringbalance.reports.prose import equation_svg, input_name, opening, typeset
+from ringbalance.reports.prose import equation_svg, opening, typeset
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.traced import marked, printed
 from ringbalance.results.numbers import (
@@ -59,7 +59,6 @@ _LOPSIDED_RATIO: Final = 1.2
 """Ratio of the two sides of an interval from which on both ends are shown."""
 _FINE_RATIO: Final = 0.01
 """Half-width over error below which two digits of the error suffice."""
-_MAX_NAMED_INPUTS: Final = 2
 _MAX_DIGITS: Final = 4
 """Digits of a number in brief: the uncertainty of the inputs justifies no more, even in fine comparisons."""
 _MAX_LABEL_CHARACTERS: Final = 28
@@ -214,9 +213,6 @@ def case_view(case: Record) -> Record:
         geometry = f", {each['geometry']} geometry" if each.get("geometry") else ""
         sequences.append({**_NO_SEQUENCE, **each, "label": f"{each['quantity']}{geometry}"})
     falling = [s for s in sequences if s["error"] and all(e is not None and e > 0 for e in s["error"])]
-    inputs = [f"{input_name(each['path'])} ({each['origin']})" for each in case.get("rests_on") or []]
-    if len(inputs) > _MAX_NAMED_INPUTS + 1:
-        inputs[_MAX_NAMED_INPUTS:] = [f"{len(inputs) - _MAX_NAMED_INPUTS} more"]
     tables: list[Table] = []
     files: list[tuple[str, str]] = []
     for table in case.get("tables") or []:
@@ -241,7 +237,7 @@ def case_view(case: Record) -> Record:
         "why_not_run": case.get("status") or "" if case["verdict"] == "not run" else "",
         "consequence": case.get("consequence") or "",
         "cause": case.get("cause") or "",
-        "rests_on": inputs,
+        "rests_on": bool(case.get("rests_on")),
         "box": {key: case.get(key) for key in _BOX_KEYS},
         "mutations": {each["id"]: each for each in case.get("mutations") or []},
         "equations": [

@@ -21,7 +21,7 @@ from typing import Any, Final, TypeAlias, TypeVar, cast
 import numpy as np
 
 from ringbalance.export import host_math
-from ringbalance.export.rows import COMPLEX, FAR, Layout, numbers_of
+from ringbalance.export.rows import COMPLEX, FINITE_INFINITY, Layout, numbers_of
 from ringbalance.export.translate import LAW, MATHS, NOTHING, NUMBER, QUERY, TRUTH, WHOLE, Source
 
 _ROWS: Final = {"c": LAW, "w": QUERY}
@@ -88,7 +88,9 @@ class _Varying(Exception):  # noqa: N818
 
 def _constant(value: float) -> _Scalar:
     kind = TRUTH if isinstance(value, bool) else WHOLE if isinstance(value, int) else NUMBER
-    return _Scalar(repr(min(max(float(value), -FAR), FAR) if kind == NUMBER else value), kind)
+    return _Scalar(
+        repr(min(max(float(value), -FINITE_INFINITY), FINITE_INFINITY) if kind == NUMBER else value), kind
+    )
 
 
 def _as(value: _Scalar, kind: str) -> str:

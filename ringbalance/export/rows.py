@@ -10,7 +10,7 @@ import numpy as np
 
 from ringbalance.export.translate import NUMBER, TRUTH, WHOLE
 
-FAR: Final = 1e150
+FINITE_INFINITY: Final = 1e150
 """Number in place of an infinity, with a finite square."""
 COMPLEX: Final = ("real", "imag")
 _KINDS: Final = {bool: TRUTH, np.bool_: TRUTH, int: WHOLE, np.int64: WHOLE, float: NUMBER, np.float64: NUMBER}
@@ -66,5 +66,5 @@ def _parts(value: Any) -> tuple[tuple[str, ...], list[Any]]:
 def numbers_of(value: Any) -> list[float]:
     """Numbers of a value, in the order of its layout."""
     if type(value) in _KINDS:
-        return [min(max(float(value), -FAR), FAR)]
+        return [min(max(float(value), -FINITE_INFINITY), FINITE_INFINITY)]
     return [number for each in _parts(value)[1] for number in numbers_of(each)]

@@ -55,7 +55,8 @@ def test_tune_tries_its_settings_and_its_remedies(beside: Path) -> None:
     code, text = ended(beside, "tune heavy.toml --json")
     document = json.loads(text)
     assert code == 1
-    assert set(document["settings"]) == {"balls.drag"}
+    assert document["settings"].keys() <= {"balls.drag"}
+    assert document["own"]["verdict"] == "not met"
     (remedy,) = document["remedies"]
     assert remedy["changes"]["balls.mass"] == pytest.approx(1.44e-3, rel=1e-2)
     assert remedy["verdict"] == "met"

@@ -365,14 +365,10 @@ def _convention_rows(run: Simulation) -> Iterator[ConventionRow]:
         velocity = balancing.rms_velocity(amplitude=amplitude, speed=rotor.speed)
         yield f"{key}_peak_to_peak", f"vibration {when}, peak to peak", 2 * amplitude, "m", "ok"
         yield f"{key}_velocity", f"vibration {when}, velocity, rms", velocity, "m/s", "ok"
-    factor, controller = run.loop.value, scene.controller
-    if run.loop.fixed and factor is not None and factor < run.loop.limit:
-        peak = balancing.peak_sensitivity(
-            loop_factor=factor,
-            integral=controller.period / (controller.integral_time or math.inf),
-            derivative=controller.derivative_time / controller.period,
-        )
-        name = f"peak sensitivity of the loop (zone {balancing.zone(peak)} of ISO 14839-3)"
+    margins = run.loop.margins if run.loop.fixed else None
+    if margins is not None and margins.stable:
+        peak = margins.sensitivity_peak
+        name = f"peak sensitivity of the proportional part (zone {balancing.zone(peak)} of ISO 14839-3)"
         yield "peak_sensitivity", name, peak, "1", "ok"
 
     first = min((each.time + each.duration for each in run.injections if each.moved), default=None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from pathlib import Path
@@ -102,9 +103,81 @@ def test_with_integral_and_derivative_matrices_and_transfer_function_agree(
         transfer = -turned[0]
         shape = 1 + loop.integral / 2 * (z + 1) / (z - 1) + loop.derivative * (1 - 1 / z)
         assert transfer == pytest.approx(loop.gain * shape / (z - 1), rel=1e-9)
-    margins = loop_margins(loop_factor=abs(loop.gain), integral=loop.integral, derivative=loop.derivative)
-    assert loop.disk_margin == pytest.approx(margins.disk, rel=1e-9)
-    assert loop.zone == "A"
+    assert not loop.proportional_alone
+    assert "keeps its direction" in repr(loop)
+
+
+EDGE = [
+    (0.0, None, 0.0),
+    (0.0, None, 0.2),
+    (0.0, 2.5, 0.0),
+    (0.0, 2.5, 0.06),
+    (30.0, None, 0.2),
+    (30.0, 2.5, 0.0),
+]
+
+
+@pytest.mark.parametrize(("degrees", "integral_time", "derivative_time"), EDGE)
+def test_runs_lose_stability_at_the_printed_gain_margin(
+    scene: Scene, law: CompleteLaw, degrees: float, integral_time: float | None, derivative_time: float
+) -> None:
+    """With integral and derivative too: the amplitude is constant at the edge, reversals reset the sum."""
+    wanted = {
+        "controller.assumed_lag_angle": scene.rotor.lag_angle + math.radians(degrees),
+        "controller.integral_time": integral_time,
+        "controller.derivative_time": derivative_time,
+        "controller.minimum_gas_time": 0.0,
+        "controller.limit": "1 nm",
+    }
+    asked = scene.with_values(wanted)
+    loop = rb.linear_loop(asked, flow_law=law)
+    assert loop.margins.gain_factor == pytest.approx(2 * math.cos(math.radians(degrees)) / abs(loop.gain))
+    stable = []
+    for part in (0.96, 1.04):
+        gain = asked.controller.proportional * part * loop.margins.gain_factor
+        tried = asked.with_values({"controller.proportional": gain})
+        run = simulate(tried, BalancerModel.of(law), modelled=[])
+        margins, tried_loop = run.loop.margins, rb.linear_loop(tried, flow_law=law)
+        assert margins is not None
+        assert margins.sensitivity_peak == pytest.approx(tried_loop.sensitivity_peak, rel=1e-9)
+        stable.append((run.settled, tried_loop.stable, margins.stable))
+    assert stable == [(True, True, True), (False, False, False)]
+
+
+@pytest.mark.parametrize("integral_time", [2.5, 48.0])
+def test_runs_lose_stability_at_45_degrees_with_an_integral(
+    scene: Scene, law: CompleteLaw, integral_time: float
+) -> None:
+    """However small it is: up to there a residual at the edge turns by 90 deg or more, which resets it."""
+    settled = []
+    for degrees in (42.0, 52.0):
+        wanted = {
+            "controller.assumed_lag_angle": scene.rotor.lag_angle + math.radians(degrees),
+            "controller.integral_time": integral_time,
+            "controller.minimum_gas_time": 0.0,
+            "controller.limit": "1 nm",
+        }
+        tried = scene.with_values(wanted)
+        run = simulate(tried, BalancerModel.of(law), modelled=[])
+        settled.append((run.settled, rb.linear_loop(tried, flow_law=law).stable))
+        alone = tried.with_values({"controller.integral_time": None})
+        assert rb.linear_loop(alone, flow_law=law).stable
+    assert settled == [(True, True), (False, False)]
+
+
+def test_margins_of_an_error_of_the_lag_angle() -> None:
+    margins = loop_margins(0.5 * np.exp(-0.3j))
+    assert margins.gain_factor == pytest.approx(4 * math.cos(0.3))
+    assert margins.phase == pytest.approx(math.acos(0.25) - 0.3)
+    assert loop_margins(0.5 * np.exp(-0.3j), integral=True).phase == pytest.approx(math.pi / 4 - 0.3)
+
+
+def test_the_interval_is_that_of_a_correction_at_the_limit(scene: Scene, law: CompleteLaw) -> None:
+    tried = scene.with_values({"controller.integral_time": "2.5 s", "controller.gas_time_offset": "0.1 s"})
+    loop = rb.linear_loop(tried, flow_law=law)
+    interval = 0.5 + 0.1 + scene.controller.proportional * scene.controller.limit
+    assert loop.plant.dt == loop.controller.dt == pytest.approx(interval)
+    assert loop.integral == pytest.approx(interval / 2.5)
 
 
 def zone_of(scene: Scene, law: CompleteLaw, gain: float) -> LinearLoop:
@@ -129,6 +202,7 @@ def test_it_prints_its_margins_and_not_its_matrices(scene: Scene, law: CompleteL
     assert "stable" in text
     assert "array" not in text
     assert len(text.splitlines()) == 4
+    assert f"gain margin {loop.margins.gain_factor:.3g}" in text
 
 
 def test_python_control_takes_it(scene: Scene, law: CompleteLaw) -> None:
@@ -137,9 +211,9 @@ def test_python_control_takes_it(scene: Scene, law: CompleteLaw) -> None:
     plant, controller = loop.plant.to_control(), loop.controller.to_control()
     assert plant.input_labels == ["air_time_x", "air_time_y"]
     assert plant.output_labels == ["vibration_x", "vibration_y"]
-    # With a state that does nothing: without any, python-control 0.10.2 trips over NumPy 2.5.
-    unity = control.StateSpace([[0.0]], np.zeros((1, 2)), np.zeros((2, 1)), np.eye(2), plant.dt)
-    closed = control.feedback(plant * controller, unity, sign=1)
+    page = (Path(__file__).parents[2] / "docs" / "host-python.md").read_text(encoding="utf-8")
+    (printed,) = re.findall(r"`(control\.feedback\(.*\))`", page)
+    closed = eval(printed, {"control": control, "np": np, "plant": plant, "controller": controller})
     poles = np.sort(np.abs(closed.poles()))
     right = np.sort(np.abs(np.linalg.eigvals(loop.closed)))
     assert poles[-1] == pytest.approx(right[-1], rel=1e-6)

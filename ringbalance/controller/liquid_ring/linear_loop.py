@@ -3,10 +3,13 @@
 From sample to sample, in the frame of the disc (x towards chamber A), with vibration v and valve-open time t
 as complex numbers: the plant v' = v - b exp(-j lag) t removes b per second in the direction of the gas, the
 controller t = Kc exp(j lag') (v + w' + q (v - v_before)), w' = w + i (v + v_before)/2 commands it, i = dt/Ti
-and q = Td/dt.  With g = Kc b exp(j (lag' - lag)) the loop is L(z) = g C(z)/(z - 1),
-C = 1 + (i/2)(z + 1)/(z - 1) + q (1 - 1/z).  A complex number c is the matrix ((Re c, -Im c), (Im c, Re c)):
-the loop of two inputs and two outputs has the margins and the sensitivity of the complex one over the whole
-unit circle.
+and q = Td/dt.  A complex number c is the matrix ((Re c, -Im c), (Im c, Re c)).
+
+The proportional part is exact: g = Kc b exp(j (lag' - lag)), L(z) = g/(z - 1).  The algorithm is a PID on
+the amplitude, in the direction of the present vector; `before` and `integral` are those of a PID on the
+vector, and the same only while the direction stays.  Where the residual reverses at every sample the
+amplitude hardly changes, so the algorithm's derivative is about zero where that of the matrices is largest,
+and the integral is reset.  Margins are therefore those of `loop_factor.loop_margins`, as runs have them.
 """
 
 from __future__ import annotations
@@ -20,19 +23,18 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.liquid_ring.loop_factor import FREQUENCIES, default_gain, loop_rate
+from ringbalance.controller.liquid_ring.loop_factor import Margins, default_gain, loop_margins, loop_rate
+from ringbalance.physics import balancing
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
 from ringbalance.results.rows import Finding
-from ringbalance.scene.arrays import ComplexArray, FloatArray, finite
+from ringbalance.scene.arrays import FloatArray, finite
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.registry import registered
 
 AIR_TIME: Final = ("air_time_x", "air_time_y")
 VIBRATION: Final = ("vibration_x", "vibration_y")
-_ZONES: Final = ((3.0, "A"), (4.0, "B"), (5.0, "C"))
-"""Peaks of the sensitivity up to which a zone of ISO 14839-3 reaches: 9.5 and 12 dB as the documentation of
-ROSS (its tutorial on magnetic bearings) reports them, 14 dB recalled; the standard itself was not read."""
+_INEXACT: Final = "integral and derivative of the matrices hold only while the residual keeps its direction"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,7 +49,8 @@ class StateSpace:
     outputs: tuple[str, ...]
     states: tuple[str, ...]
     dt: float
-    """Time from the closing of the valves to the next sample, s; valve-open times add to it."""
+    """Sampling interval of a correction at the limit, s: `period`, the valve's offset and Kc times the limit.
+    With a larger correction the interval, and the integral's part of it, is longer by the valve-open time."""
 
     def to_control(self) -> Any:
         """A `control.StateSpace` with these names. Raises: ImportError: python-control is not installed."""
@@ -85,11 +88,14 @@ class LinearLoop:
 
     def __repr__(self) -> str:
         """Results on the loop without its matrices, for JSON."""
-        plant = self.plant
+        plant, margins = self.plant, self.margins
         lines = [
-            f"Linear loop, {'stable' if self.stable else 'unstable'}, sampled every {plant.dt:g} s",
-            f"  disk margin {self.disk_margin:.3g} of 2",
-            f"  peak of the sensitivity {self.sensitivity_peak:.3g}, zone {self.zone}",
+            f"Linear loop, {'stable' if self.stable else 'unstable'}, sampled every {plant.dt:.3g} s "
+            "near the limit",
+            f"  gain margin {margins.gain_factor:.3g}, phase margin {math.degrees(margins.phase):.3g} deg",
+            f"  proportional part: disk margin {self.disk_margin:.3g} of 2, "
+            f"peak of the sensitivity {self.sensitivity_peak:.3g}, zone {self.zone}",
+            *(() if self.proportional_alone else [f"  {_INEXACT}"]),
             *(each.text for each in self.findings),
             f"  plant: {', '.join(plant.inputs)} -> {', '.join(plant.outputs)}; the controller the other way",
         ]
@@ -102,6 +108,8 @@ class LinearLoop:
             "gain": [self.gain.real, self.gain.imag],
             "integral": self.integral,
             "derivative": self.derivative,
+            "gain_margin": self.margins.gain_factor,
+            "phase_margin_rad": self.margins.phase,
             "disk_margin": self.disk_margin,
             "sensitivity_peak": finite(self.sensitivity_peak),
             "zone": self.zone,
@@ -109,60 +117,40 @@ class LinearLoop:
         }
 
     @property
+    def margins(self) -> Margins:
+        """Margins of the algorithm; disk and peak are of its proportional part."""
+        return loop_margins(self.gain, integral=self.integral > 0.0)
+
+    @property
     def stable(self) -> bool:
-        """True if a small residual decays."""
-        return bool(np.max(np.abs(np.linalg.eigvals(self.closed))) < 1.0)
+        """True if a small residual decays in runs; `closed` may differ with an integral or a derivative."""
+        return self.margins.stable
 
     @property
     def closed(self) -> FloatArray:
-        """Matrix of the closed loop over the states of plant and controller."""
+        """Closed loop of the matrices over all states; positive feedback, as the sign is in the plant."""
         p, k = self.plant, self.controller
         return np.block([[p.a + p.b @ k.d @ p.c, p.b @ k.c], [k.b @ p.c, k.a]])
 
     @property
     def sensitivity_peak(self) -> float:
-        """Largest gain from a disturbance of the vibration to the vibration, max |1/(1 + L)|.
-
-        With P alone 1/(1 + L) = (z - 1)/(z - 1 + g) maps the unit circle to a circle: 2/(2 - h) for real g.
-        Infinite for an unstable loop.
-        """
-        if not self.stable:
-            return math.inf
-        if self.proportional_alone:
-            centre, radius = _image(1.0, 1.0 - self.gain)
-            return abs(centre) + radius
-        return float(np.max(np.abs(1.0 / (1.0 + self._open(_circle())))))
+        """Peak of the sensitivity of the proportional part, see `Margins`."""
+        return self.margins.sensitivity_peak
 
     @property
     def zone(self) -> str:
-        """Zone A to D of ISO 14839-3 by the peak of the sensitivity; a standard for magnetic bearings, of
-        limited meaning for a loop that is closed once in a period."""
-        return next((name for most, name in _ZONES if self.sensitivity_peak < most), "D")
+        """Zone A to D of ISO 14839-3 by this peak, see `balancing.zone`."""
+        return balancing.zone(self.sensitivity_peak)
 
     @property
     def disk_margin(self) -> float:
-        """Disk margin, 0 to 2: gain and phase of both axes may change together, differently by frequency.
-
-        With P alone min |2 (1 + L)/(1 - L)| = 2 |z - 1 + g|/|z - 1 - g|, the nearest point of a circle:
-        2 (2 - h)/(2 + h) for real g.
-        Source: as `loop_factor.loop_margins`.
-        """
-        if not self.stable:
-            return 0.0
-        if self.proportional_alone:
-            centre, radius = _image(1.0 - self.gain, 1.0 + self.gain)
-            return min(2.0 * abs(abs(centre) - radius), 2.0)
-        loop = self._open(_circle())
-        return min(float(np.min(np.abs(2.0 * (1.0 + loop) / (1.0 - loop)))), 2.0)
+        """Disk margin of the proportional part, 0 to 2, see `Margins`."""
+        return self.margins.disk
 
     @property
     def proportional_alone(self) -> bool:
-        """True if the margins have a closed form."""
+        """True if the matrices are exact: without integral and derivative."""
         return self.integral == 0.0 and self.derivative == 0.0
-
-    def _open(self, z: ComplexArray) -> ComplexArray:
-        shape = 1.0 + self.integral / 2.0 * (z + 1.0) / (z - 1.0) + self.derivative * (1.0 - 1.0 / z)
-        return np.asarray(self.gain * shape / (z - 1.0))
 
 
 def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
@@ -181,7 +169,8 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
     if scene.controller.kind != "target_vector":
         problem = f"the controller {scene.controller.kind!r} has no linear loop"
         raise SceneError.of_file(scene.file, problem, 'controller.kind = "target_vector"')
-    settings, dt, lag = scene.controller, scene.controller.period, scene.rotor.lag_angle
+    settings, lag = scene.controller, scene.rotor.lag_angle
+    dt = settings.period + max(settings.offsets(scene.disc.chambers)) + settings.proportional * settings.limit
     rate = loop_rate(scene, BalancerModel.of(flow_law))
     plant = StateSpace(
         a=np.eye(2),
@@ -229,14 +218,3 @@ def _matrix(rows: Sequence[Sequence[complex]]) -> FloatArray:
     return np.asarray(
         np.kron(values.real, np.eye(2)) + np.kron(values.imag, np.array([[0.0, -1.0], [1.0, 0.0]]))
     )
-
-
-def _image(a: complex, b: complex) -> tuple[complex, float]:
-    """Centre and radius of the circle to which (z - a)/(z - b) maps the unit circle, |b| not 1."""
-    inside = 1.0 - abs(b) ** 2
-    return 1.0 + (b - a) * complex(b).conjugate() / inside, abs(b - a) / abs(inside)
-
-
-def _circle() -> ComplexArray:
-    """Points of the unit circle on both sides of z = 1."""
-    return np.exp(1j * np.concatenate([FREQUENCIES, -FREQUENCIES]))

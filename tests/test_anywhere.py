@@ -120,3 +120,7 @@ def test_fannings_factors_are_recognised(
     assert all(hint in each["hint"] if hint else not each["hint"] for each in documents)
     assert main(["verify", *words]) == 0
     assert capsys.readouterr().out.count("Fanning") == (2 if hint else 0)
+    assert main(["verify", *words, "--brief"]) == 0
+    short = capsys.readouterr().out
+    assert short.count("3 points, bias ") == short.count(f"  {verdict} (") == 2
+    assert short.count("Fanning") == (2 if hint else 0)

@@ -11,6 +11,7 @@ from typing import Any, Final
 from ringbalance.results.numbers import percent
 from ringbalance.results.result import Rows, Table, print_rows
 from ringbalance.scene import liquid_ring_scene, load_scene
+from ringbalance.scene.origins import summary_text
 from ringbalance.scene.platform.display import display
 from ringbalance.scene.platform.terminal import activity, print_error, results_console
 from ringbalance.scene.registry import registered
@@ -119,8 +120,15 @@ def _print_judgement(document: Mapping[str, Any]) -> None:
         )
         for name, each in series.items()
     ]
+    title = f"{document['title']}  {document['verdict']} ({document['source']})"
+    if display().brief:
+        _, points, bias, within = lines[-1]
+        numbers = f"{points} points, bias {bias}, {within} within both intervals"
+        text = summary_text([title, numbers, *filter(None, [document["hint"]])])
+        results_console().print(text, markup=False, highlight=False)
+        return
     rows = Rows(
-        title=f"{document['title']}  {document['verdict']} ({document['source']})",
+        title=title,
         quantities=(),
         facts=[("rule", f"confirmed where at least {percent(document['limit'])} lie within both intervals")]
         + ([("but", document["hint"])] if document["hint"] else []),

@@ -16,6 +16,7 @@ from ringbalance.reduced_model.injection.dynamics import WORKSPACE, empty_plants
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
 from ringbalance.scene.arrays import Records
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import scene_as
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +64,7 @@ def scene_controller(scene: Scene, *, flow_law: CompleteLaw | None = None) -> St
     """The algorithm of a scene with its settings, to use within an algorithm of your own.
 
     Args: `flow_law`: law that the law-based algorithm assumes; default the calibrated law.
+    Raises: SceneError: another balancer.
 
     Example:
         >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
@@ -72,5 +74,6 @@ def scene_controller(scene: Scene, *, flow_law: CompleteLaw | None = None) -> St
         >>> [valve.chamber for valve in command.valves]
         [0, 1]
     """
+    scene = scene_as(Scene, scene)
     model = BalancerModel.of(flow_law or chamber_and_law(scene)[1])
     return Stepped(controller_of(scene, model))

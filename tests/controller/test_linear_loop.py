@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 import ringbalance as rb
 from ringbalance.controller.liquid_ring.linear_loop import LinearLoop
-from ringbalance.controller.liquid_ring.loop_factor import loop_margins
+from ringbalance.controller.liquid_ring.loop_factor import loop_margins, loop_rate
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
 from ringbalance.scene.faults import SceneError
@@ -251,3 +252,23 @@ def test_a_gain_that_the_scene_does_not_give_is_named(scene: Scene, law: Complet
 def test_another_controller_has_no_linear_loop(scene: Scene, law: CompleteLaw) -> None:
     with pytest.raises(SceneError, match="law_based"):
         rb.linear_loop(scene.with_values({"controller.kind": "law_based"}), flow_law=law)
+
+
+def test_scenes_of_the_other_balancer_are_refused_in_one_sentence(scene: Scene, law: CompleteLaw) -> None:
+    masses: Any = rb.load_scene(rb.bundled_scene("washing_machine"))
+    calls: dict[str, Callable[[], object]] = {
+        "liquid_ring": lambda: rb.linear_loop(masses, flow_law=law),
+        "liquid_ring: its law": lambda: rb.scene_controller(masses),
+        "eccentric_mass": lambda: rb.eccentric_loop(cast(Any, scene)),
+    }
+    for balancer, call in calls.items():
+        with pytest.raises(SceneError, match=f"needs a scene of the balancer {balancer}"):
+            call()
+
+
+def test_the_rate_is_that_of_unequal_fills() -> None:
+    """The paper's disc cancels 10 um with unequal fills, and its fastest pair is 0.2 % below the product."""
+    paper = cast(Scene, rb.load_scene(rb.bundled_scene("liquid_ring_paper")))
+    model = BalancerModel.of(rb.calibrate(paper).flow_law)
+    level = paper.with_values({"rotor.initial_vibration.amplitude": "1e-6 um"})
+    assert loop_rate(paper, model) / loop_rate(level, model) == pytest.approx(0.9981, abs=1e-4)

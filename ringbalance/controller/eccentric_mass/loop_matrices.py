@@ -12,6 +12,7 @@ from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.targets import target_angles
 from ringbalance.results.result import csv_text
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.narrowing import scene_as
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,11 +75,14 @@ class EccentricLoop:
 def eccentric_loop(scene: EccentricScene) -> EccentricLoop:
     """Matrices, gains and targets of a scene's strategy.
 
+    Raises: SceneError: another balancer, see `linear_loop`.
+
     Example:
         >>> loop = rb.eccentric_loop(rb.load_scene(rb.bundled_scene("eccentric_mass_paper")))
         >>> loop.transition.shape
         (2, 6, 6)
     """
+    scene = scene_as(EccentricScene, scene)
     settings, arms = StrategySettings.of(scene), scene.masses.friction_arm
     law, filter_, friction, sensor = settings.law, settings.filter, settings.friction, settings.sensor
     step, noise, speeds = settings.step * friction.every, friction.noise, filter_.speed

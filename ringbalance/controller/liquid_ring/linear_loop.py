@@ -30,6 +30,7 @@ from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import FloatArray, finite
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import scene_as
 from ringbalance.scene.registry import registered
 
 AIR_TIME: Final = ("air_time_x", "air_time_y")
@@ -158,7 +159,7 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
 
     Args: `flow_law`: such as `calibrate(scene).flow_law`; what one second of gas removes is the mean of a
         pair's two chambers, of all pairs the largest.
-    Raises: SceneError: another controller, which has no linear loop.
+    Raises: SceneError: another balancer, see `eccentric_loop`, or another controller.
 
     Example:
         >>> scene = rb.load_scene(rb.bundled_scene("six_chamber"))
@@ -166,6 +167,7 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
         >>> loop.stable
         True
     """
+    scene = scene_as(Scene, scene)
     if scene.controller.kind != "target_vector":
         problem = f"the controller {scene.controller.kind!r} has no linear loop"
         raise SceneError.of_file(scene.file, problem, 'controller.kind = "target_vector"')

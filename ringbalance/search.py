@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Executor
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ringbalance.design.design_rows import design_document, design_rows
 from ringbalance.design.designing import Design, run_design
-from ringbalance.design.in_place import keep_design, within_disc
+from ringbalance.design.in_place import beside_unchanged, keep_design, opens_valve, within_disc
 from ringbalance.interface import checked
 from ringbalance.results.result import Presentation
 from ringbalance.scene import AnyScene
@@ -49,14 +50,22 @@ def find_design(
     if scene.balancer == "eccentric_mass" and not in_place:
         design_masses: Callable[..., MassDesign] = imported("ringbalance.design.mass_design:design_masses")
         return design_masses(scene, executor=executor, workers=workers, progress=progress)
-    searched = within_disc(liquid_ring_scene(scene)) if in_place else scene
-    design = run_design(
-        searched,
+    run = partial(
+        run_design,
         presentation=Presentation(document=design_document, rows=design_rows),
         executor=executor,
         workers=workers,
         progress=progress,
     )
-    if in_place and design.judgement is not None:
-        keep_design(scene, design)
-    return design
+    if not in_place:
+        return run(scene)
+    ring = liquid_ring_scene(scene)
+    design = run(within_disc(ring))
+    if not design.succeeded and ring.gas.conductance is not None and opens_valve(ring):
+        # The scene's own valve stays where it suffices.
+        other = run(within_disc(ring, other_valves=True))
+        design = other if other.succeeded else design
+    if design.judgement is None:
+        return design
+    keep_design(scene, design)
+    return beside_unchanged(ring, design)

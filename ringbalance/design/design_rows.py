@@ -19,7 +19,8 @@ from ringbalance.controller.judging.tuning import (
     reported_quantities,
     required_table,
 )
-from ringbalance.design.designing import Design
+from ringbalance.design.designing import PRESSURE, Design
+from ringbalance.design.space import VALVE
 from ringbalance.results.numbers import MISSING, format_given, percent
 from ringbalance.results.requirements import AT_LEAST, MET, MISSED, OPEN
 from ringbalance.results.result import Rows, Table
@@ -47,7 +48,7 @@ def design_rows(design: Design) -> Rows:
         title=f"Design for {design.given.name} ({design.given.source})",
         quantities=tuple(_quantities(design)),
         findings=tuple(_findings(design)),
-        tables=(*tables, _effects_table(design), _front_table(design), *held),
+        tables=(*tables, *_unchanged_table(design), _effects_table(design), _front_table(design), *held),
     )
 
 
@@ -78,6 +79,7 @@ def design_document(design: Design) -> dict[str, Any]:
         "asked": judgement.required_fraction if judgement else None,
         **(judgement.document() if judgement else {"verdict": MISSED, "fraction": None}),
         "required": judgement.demands_document() if judgement else [],
+        **_unchanged_document(design),
         "effects": [
             {
                 "path": each.path,
@@ -158,6 +160,14 @@ def _findings(design: Design) -> Iterator[Finding]:
     else:
         yield from misses(judgement, design.ranking)
     # Keys at an end of their range, and `vary` with a wider range if the end is a default.
+    if design.assumed:
+        name, lag = design.space.names(design.point)[VALVE], float(design.point["gas.valve_lag"])
+        yield Finding(code="design_lag", values={"name": name, "lag": lag})
+    for each in design.effects if design.succeeded else ():
+        required = judgement.required_fraction
+        if each.path == PRESSURE and each.met is not None and each.met.verdict(required) == MISSED:
+            values = {"pressure": each.changes[PRESSURE], "share": each.met.value, "of": each.met.of}
+            yield Finding(code="design_pressure", values={**values, "asked": required})
     code, default = _EDGES[design.succeeded]
     for path, ends in (pair for axis in design.space.axes for pair in axis.ranges.items()):
         value = float(design.point[path])
@@ -233,6 +243,42 @@ def _keys_table(design: Design, judgement: Judgement) -> Table:
         for path, value in judgement.settings.items()
     ]
     return Table(caption="Design", heads=("key", "the scene's", "designed", "among"), rows=rows)
+
+
+def _unchanged_document(design: Design) -> dict[str, Any]:
+    """The design's gas and the results of the scene's own disc, for JSON, SI; empty where the size varies."""
+    if design.unchanged is None or design.judgement is None:
+        return {}
+    unchanged, reach = design.unchanged
+    before = {**unchanged.document(), "energy_J": _gas(unchanged), "reach_kg_m": reach}
+    return {"energy_J": _gas(design.judgement), "unchanged": before}
+
+
+def _gas(judgement: Judgement) -> float | None:
+    """Median of the energy of the gas of the devices that settle, J."""
+    energies = judgement.outcomes.energy[judgement.outcomes.settled]
+    return finite(float(np.median(energies))) if energies.size else None
+
+
+def _unchanged_table(design: Design) -> Iterator[Table]:
+    """Table of the scene's own disc with its own settings beside the design; none where the size varies."""
+    if design.unchanged is None or design.judgement is None:
+        return
+    unchanged, reach = design.unchanged
+    valve = "" if raw_value_at(design.given, "gas.conductance") else ", with an ideal valve"
+    pairs = ((f"the scene's own{valve}", unchanged, reach), ("designed", design.judgement, design.reach))
+    rows = [
+        (
+            name,
+            percent(judgement.fraction.value, digits=3),
+            *(format_given(time, "s", digits=3) for time in judgement.settling_times.values()),
+            format_given(_gas(judgement), "J", digits=3),
+            format_given(reach, "kg m", digits=3),
+        )
+        for name, judgement, reach in pairs
+    ]
+    heads = ("", "devices that meet all", "half within", "90 % within", "gas, median", "cancels")
+    yield Table(caption="Beside the scene's own disc and settings", heads=heads, rows=rows)
 
 
 def _effects_table(design: Design) -> Table:

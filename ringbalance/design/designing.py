@@ -35,6 +35,7 @@ from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.platform.processes import beside
 
+PRESSURE: Final = "gas.pressure"
 _MOVE_FRACTION: Final = 0.05
 """Relative change of a key, up and down, for its effect."""
 _EFFECT_DEVICES: Final = 256
@@ -96,6 +97,11 @@ class Design(PresentedResult):
     """Alternative designs that should meet the requirements, Pareto-optimal in size, time and gas."""
     effects: tuple[Effect, ...]
     ranking: Ranking
+    unchanged: tuple[Judgement, float | None] | None = None
+    """Judgement of the scene's own disc and settings, and the unbalance that it cancels, kg m; None: the size
+    varies."""
+    assumed: tuple[str, ...] = ()
+    """Paths of `point` whose values the program assumes, such as the lag of a valve on sale."""
     endurance: Endurance | None
     """Devices over the hours of holding; None: the loss of liquid is not known, or not required."""
 
@@ -115,7 +121,8 @@ class Design(PresentedResult):
         if self.judgement is None:
             problem, allowed = "no design can work", "more space, pressure or a smaller unbalance"
             raise SceneError.of_file(self.given.file, problem, allowed)
-        return self.given.with_values({**self.point, **self.judgement.settings})
+        scene = self.given.with_values({**self.point, **self.judgement.settings})
+        return scene.with_values({path: self.point[path] for path in self.assumed}, origin="assumed")
 
 
 def run_design(
@@ -156,13 +163,21 @@ def run_design(
             seed=start,
         )
         races, raced = search.races, len(search.races.candidates)
-        judged = judged_designs(search)
+        judged, supply = judged_designs(search), space.scene.gas.pressure
+        # If no size varies, designs that a weaker supply stalls come last.
+        weaker = [
+            {**each.point, PRESSURE: (1 - _MOVE_FRACTION) * float(each.point.get(PRESSURE, supply))}
+            for each in judged
+        ]
+        weak_rows = [] if space.sized else static_rows(space.scene, weaker, intervals=False)
+        stalls = [(row_reach(row) or 0.0) < needed for row in weak_rows] or len(judged) * [False]
 
         def order(each: RacedDesign) -> float:
             """Size, m^3; if no size varies, energy of the gas, J."""
             return each.size if space.sized else float(np.nanmedian(each.race.judgement.outcomes.energy))
 
-        promising = sorted((each for each in judged if each.race.succeeded), key=order)
+        ordered = sorted(zip(judged, stalls, strict=True), key=lambda pair: (pair[1], order(pair[0])))
+        promising = [each for each, _ in ordered if each.race.succeeded]
         # If none meets the requirements, the design that serves most devices.
         queue = promising or sorted(judged, key=lambda each: -each.race.judgement.fraction.value)[:1]
         for _ in range(_MAX_VERDICTS):

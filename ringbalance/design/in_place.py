@@ -4,34 +4,55 @@ from __future__ import annotations
 
 import contextlib
 import math
-from typing import Any
+from dataclasses import replace
+from typing import Any, Final
 
-from ringbalance.controller.judging.judge import plain_settings
+from ringbalance.controller.balancer import balancer_of
+from ringbalance.controller.judging.judge import judged_all, plain_settings
 from ringbalance.controller.liquid_ring.offers import valves_on_sale
 from ringbalance.design.designing import Design
 from ringbalance.design.space import VALVE, VALVE_KEYS
+from ringbalance.design.static import row_reach, static_rows
 from ringbalance.design.store import Store, key_of
 from ringbalance.reduced_model.residual_liquid import Holding
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.platform.kept_code import code_root, trusted
 
+OF_SCENE: Final = "as in the scene"
+"""Name of the scene's valve among those on sale."""
 
-def within_disc(scene: Scene) -> Scene:
+
+def opens_valve(scene: Scene) -> bool:
+    """True if no table [design] states valves, so that valves on sale, with assumed lags, may be tried."""
+    return not scene.design.valves and scene.design.valve_file is None
+
+
+def beside_unchanged(scene: Scene, design: Design) -> Design:
+    """The design of the scene before `within_disc`, with the judgement of its own disc and settings."""
+    (unchanged,) = judged_all(balancer_of(scene), [{}])
+    reach = row_reach(static_rows(scene, [{}], intervals=False)[0])
+    valve = design.space.names(design.point).get(VALVE, OF_SCENE)
+    assumed = ("gas.valve_lag",) if opens_valve(scene) and valve != OF_SCENE else ()
+    return replace(design, given=scene, unchanged=(unchanged, reach), assumed=assumed)
+
+
+def within_disc(scene: Scene, *, other_valves: bool = False) -> Scene:
     """Scene whose [design] leaves bore, gas pressure, siphon crest, gas hole and valve open, not the size.
 
     What its [design] states stays; else the pressure reaches up to the scene's own, the crest lies between
     the inner wall and where it is sure to hold the liquid, a gas hole has up to three times its diameter
-    where a crater is limited, and the valves are that of the scene and some on sale.
+    where a crater is limited, and the valve is that of the scene, or one of some on sale where it gives none.
+    Args: `other_valves`: True for those on sale beside the scene's own.
     """
     keys, disc, gas = scene.design, scene.disc, scene.gas
     changes: dict[str, Any] = {"design.outer_radius": None, "design.axial_width": None}
     if keys.pressure is None:
         changes["design.pressure"] = gas.pressure
-    if not keys.valves and keys.valve_file is None:
+    if opens_valve(scene) and (other_valves or gas.conductance is None):
         valves = [{key: getattr(each, key) for key in ("name", *VALVE_KEYS)} for each in valves_on_sale()]
         if gas.conductance is not None:
-            valves.insert(0, {"name": "as in the scene", **{key: getattr(gas, key) for key in VALVE_KEYS}})
+            valves.insert(0, {"name": OF_SCENE, **{key: getattr(gas, key) for key in VALVE_KEYS}})
         changes["design.valves"] = [
             {key: value for key, value in valve.items() if value is not None} for valve in valves
         ]

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import ringbalance as rb
-from ringbalance.design.in_place import kept_design, within_disc
+from ringbalance.controller.balancer import balancer_of
+from ringbalance.controller.judging.judge import judged_all
+from ringbalance.design.designing import Design, Effect
+from ringbalance.design.in_place import beside_unchanged, kept_design, within_disc
 from ringbalance.design.space import Space
 from ringbalance.reduced_model.residual_liquid import Holding
-from ringbalance.results.requirements import MET
+from ringbalance.results.requirements import MET, Proportion
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform import kept_code
 
 
@@ -33,7 +39,10 @@ def test_the_size_stays_and_all_else_that_can_be_changed_is_open(paper_scene: Sc
 
 def test_what_the_scene_states_stays(paper_scene: Scene) -> None:
     valve = {"gas.conductance": "1 l/(s*bar)", "gas.critical_ratio": 0.3, "gas.valve_lag": "5 ms"}
-    assert Space.of(within_disc(paper_scene.with_values(valve))).parts["valve"].names[0] == "as in the scene"
+    # The scene's own valve is the only one, unless it does not suffice.
+    valved = paper_scene.with_values(valve)
+    assert "valve" not in Space.of(within_disc(valved)).parts
+    assert Space.of(within_disc(valved, other_valves=True)).parts["valve"].names[0] == "as in the scene"
     stated = {
         "design.outer_radius": "60 mm",
         "design.pressure": "0.9 MPa",
@@ -83,6 +92,33 @@ def test_the_answer_is_kept_for_the_values_of_the_scene(
     assert design.judgement is not None
     assert answer["fraction"] == design.judgement.fraction.document()
     assert scene.with_values(answer["changes"]).values_sha256 == design.recommended_scene.values_sha256
+    # Beside it stand the results of the scene's own disc.
+    assert isinstance(design, Design)
+    assert design.unchanged is not None
+    (own,) = judged_all(balancer_of(scene), [{}])
+    assert design.unchanged[0].fraction == own.fraction
+    document = design.to_dict()
+    assert document["unchanged"]["fraction"] == own.fraction.document()
+    assert document["unchanged"]["reach_kg_m"] > 0
+    energies = design.judgement.outcomes.energy[design.judgement.outcomes.settled]
+    assert document["energy_J"] == pytest.approx(np.median(energies))
+    (table,) = (each for each in design.rows().tables if each.caption.startswith("Beside the scene's own"))
+    assert [row[0] for row in table.rows] == ["the scene's own", "designed"]
+    # A weaker supply that serves too few is said.
+    few, many = (
+        Effect(path="gas.pressure", changes={"gas.pressure": 3e5}, met=Proportion(count=count, of=256))
+        for count in (94, 250)
+    )
+    weak = replace(design, effects=(few, many))
+    (finding,) = (each for each in weak.rows().findings if each.code == "design_pressure")
+    assert "with a gas pressure of 0.3 MPa, all else as it is, 36.7 % of 256 devices" in finding.text
+    # The lag of a valve on sale is marked in the saved scene, that of a stated one is not.
+    assert design.assumed == ()
+    on_sale = beside_unchanged(liquid_ring_scene(scene.with_values({"design.valves": None})), design)
+    assert on_sale.recommended_scene.origin_of("gas.valve_lag") == "assumed"
+    assert on_sale.recommended_scene.origin_of("gas.conductance") == "given"
+    (finding,) = (each for each in on_sale.rows().findings if each.code == "design_lag")
+    assert "20 ms of sound" in finding.text
     # Another scene has no answer, and what was damaged is none.
     assert kept_design(scene.with_values({"tube.bore": "1.3 mm"})) is None
     (file,) = (path for path in (tmp_path / "ringbalance" / "designs").rglob("*") if path.is_file())

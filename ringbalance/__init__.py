@@ -15,9 +15,9 @@ from ringbalance.scene.registry import register as register
 from ringbalance.scene.registry import register_function
 
 if TYPE_CHECKING:
-    from ringbalance.balancers import check_balancer as check_balancer
     from ringbalance.calibration import calibrate as calibrate
     from ringbalance.calibration import paper_law as paper_law
+    from ringbalance.checking import check_balancer as check_balancer
     from ringbalance.controller.algorithms.algorithm import Command as Command
     from ringbalance.controller.algorithms.algorithm import Controller as Controller
     from ringbalance.controller.algorithms.algorithm import Measurement as Measurement
@@ -103,7 +103,7 @@ register_function("xarray_dataset", path="xarray:Dataset")
 register_function("scene_lines", path="ringbalance.scene.describe:scene_lines")
 
 _NAMES = {
-    "balancers": ("check_balancer",),
+    "checking": ("check_balancer",),
     "calibration": (
         "calibrate",
         "paper_law",

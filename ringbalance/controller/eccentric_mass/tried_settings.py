@@ -29,9 +29,9 @@ _FACTORS: Final = {
     "friction_filter.drive_speed": ((1 / 2, 1.0, 2.0, 4.0), (1,)),
 }
 """Factors on the scene's value, and the indices of those that are tried first, by key."""
-_MOVE_PACE: Final = 10.0
-_SPEED_PACE: Final = 50.0
-_PAIR_PACE: Final = 2.0
+_MOVE_PACE_RAD_S: Final = 10.0
+_SPEED_PACE_RAD_S: Final = 50.0
+_PAIR_PACE_RAD_S: Final = 2.0
 """Paces of regulator, speed and pair control for any size, rad/s: those of the bundled scenes."""
 _FRICTION_ANGLE_RAD: Final = 0.2
 """Distance from its goal at which the regulator overcomes all friction, uncompensated."""
@@ -80,12 +80,12 @@ def sized_gains(scene: EccentricScene) -> dict[str, float]:
     """
     plant, inertia, keys = PlantParameters.of(scene), track_model(scene).inertia, scene.friction_filter
     friction = max(plant.friction_arm) * plant.moment * scene.rotor.speed_profile[0].speed ** 2
-    stiffness = max(inertia * _MOVE_PACE**2, friction / _FRICTION_ANGLE_RAD)
-    torque = max(inertia * _SPEED_PACE, _FRICTION_FACTOR * friction / keys.drive_speed)
+    stiffness = max(inertia * _MOVE_PACE_RAD_S**2, friction / _FRICTION_ANGLE_RAD)
+    torque = max(inertia * _SPEED_PACE_RAD_S, _FRICTION_FACTOR * friction / keys.drive_speed)
     gains = {
         _WEIGHT: scene.lqr.input_weight * stiffness**2,
         "friction_filter.speed_gain": torque / plant.drive_gain,
-        "friction_filter.pair_gain": _PAIR_PACE * torque / plant.drive_gain,
+        "friction_filter.pair_gain": _PAIR_PACE_RAD_S * torque / plant.drive_gain,
     }
     changes = {**gains, **advised(with_values_at(scene, gains))}
     return {path: rounded(value) for path, value in changes.items()}

@@ -8,14 +8,14 @@ from types import SimpleNamespace
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.interface import checked
 from ringbalance.panels.content import content_of
-from ringbalance.panels.document import REPLAY_MODULES, Panel, document_of
-from ringbalance.panels.replay import replay_content
+from ringbalance.panels.document import Panel, document_of
+from ringbalance.panels.masses import masses_document
 from ringbalance.scene import AnyScene, load_scene
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.terminal import activity, print_message
 
-_NO_DESIGNS = "the page of eccentric masses replays runs of one design"
+_NO_DESIGNS = "the page of eccentric masses has one design"
 
 
 @checked
@@ -24,8 +24,8 @@ def panel(
 ) -> Panel:
     """Page on which one watches the scene's rotor being balanced, in one file that loads nothing.
 
-    The exported disc and controller run in the browser, with the scene's drawn devices beside them; for
-    eccentric masses the page replays runs of the program.
+    The exported controller and disc, or rotor with eccentric masses, run in the browser, with the scene's
+    drawn devices.
     Args: `vary`: axes of designs that a slider moves through, such as "tube.bore=1mm:2mm:5", as in `sweep`.
         `progress`: called with a text.
     Returns: The page; `save(path)` writes it, a notebook shows it.
@@ -42,8 +42,7 @@ def panel(
         if vary:
             allowed, value = "a scene of a liquid ring", ", ".join(vary)
             raise SceneError.of_option(option="--vary", value=value, problem=_NO_DESIGNS, allowed=allowed)
-        replay = replay_content(scene, progress=show)
-        return Panel(name=scene.name, html=document_of(replay, page="replay.html", modules=REPLAY_MODULES))
+        return Panel(name=scene.name, html=masses_document(scene, progress=show))
     content = content_of(liquid_ring_scene(scene), vary=vary, progress=show)
     return Panel(name=scene.name, html=document_of(content))
 

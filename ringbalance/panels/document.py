@@ -23,11 +23,11 @@ MODULES: Final = (
     *("disc_picture", "form", "many", "main"),
 )
 """Modules of the page; each imports from those before it alone."""
-REPLAY_MODULES: Final = (
-    *("controls", "canvas", "time_plot", "polar_plot", "disc_picture"),
-    *("replay", "mass_picture", "replay_page"),
+MASS_MODULES: Final = (
+    *("numbers", "mass_blocks", "controls", "mass_model", "canvas", "time_plot", "polar_plot"),
+    *("disc_picture", "form", "mass_picture", "mass_page"),
 )
-"""Modules of the page that replays runs, in such an order."""
+"""Modules of the page of eccentric masses, in such an order; the blocks are the scene's own."""
 _IMPORT: Final = re.compile(r'^import (\{[^}]*\}) from "\./(\w+)\.js";$', re.MULTILINE)
 _EXPORT: Final = re.compile(r"^export (?=(?:const|class|(?:async )?function\*?) (\w+))", re.MULTILINE)
 
@@ -66,13 +66,19 @@ class Panel:
 
 
 def document_of(
-    content: Mapping[str, Any], *, page: str = "panel.html", modules: Sequence[str] = MODULES
+    content: Mapping[str, Any],
+    *,
+    page: str = "panel.html",
+    modules: Sequence[str] = MODULES,
+    own_modules: Mapping[str, str] | None = None,
 ) -> str:
     """HTML document of a panel, which needs no other file, from all its numbers and texts.
 
     Args: `page`: template of its body. `modules`: names of its modules, in their order.
+        `own_modules`: texts of those that are the scene's own.
     """
-    program, style = joined({name: module_text(name) for name in modules}), _part("page/panel.css")
+    texts = {name: (own_modules or {}).get(name) or module_text(name) for name in modules}
+    program, style = joined(texts), _part("page/panel.css")
     policy = (
         f"default-src 'none'; script-src {_digest(program)}; style-src {_digest(style)}; worker-src blob:; "
         "base-uri 'none'; form-action 'none'"

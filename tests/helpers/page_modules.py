@@ -14,7 +14,7 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.panels.content import content_of
-from ringbalance.panels.document import MODULES, REPLAY_MODULES, module_text
+from ringbalance.panels.document import MASS_MODULES, MODULES, module_text
 from ringbalance.scene.models import Scene
 
 NODE: Final = shutil.which("node")
@@ -40,13 +40,17 @@ def page_folder() -> Path:
     """Folder with all modules of the page."""
     folder = Path(mkdtemp(prefix="panel"))
     (folder / "package.json").write_text('{"type": "module"}')
-    for name in {*MODULES, *REPLAY_MODULES}:
+    for name in {*MODULES, *MASS_MODULES} - {"mass_blocks"}:
         (folder / f"{name}.js").write_text(module_text(name))
     return folder
 
 
-def in_node(script: str, **values: Any) -> Any:
-    """Value of `answer` after a script on the page's modules. Args: `values`: its constants by name."""
+def in_node(script: str, *, blocks: str = "", **values: Any) -> Any:
+    """Value of `answer` after a script on the page's modules.
+
+    Args: `blocks`: module of a scene with eccentric masses. `values`: the script's constants by name.
+    """
+    (page_folder() / "mass_blocks.js").write_text(blocks)
     lines = [f"const {name} = JSON.parse({json.dumps(json.dumps(each))});" for name, each in values.items()]
     text = "\n".join(
         [*_imports(script), *lines, "let answer;", script, "console.log(JSON.stringify(answer));"]
@@ -65,10 +69,7 @@ _EXPORTS: Final = {
     "address": ("read", "written"),
     "devices": ("bounds", "summary", "noiseOf", "verdict"),
     "disc_picture": ("surfaceRadius", "sector"),
-    "replay": (
-        *("unpackRuns", "stateAt", "halfPrecision", "instantAt", "stageAt", "stageMarks", "profileAt"),
-        *("replayAddress", "replayState"),
-    ),
+    "mass_model": ("MASS_CONTROLS", "MassRun", "constantsOf", "massAddress", "massSettings", "massState"),
     "mass_picture": ("moments",),
 }
 

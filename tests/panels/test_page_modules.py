@@ -321,8 +321,8 @@ def test_a_slider_gives_back_what_it_shows() -> None:
     ranges = ranges_of(panel_scene("liquid_ring_paper"), panel_content("liquid_ring_paper")["valves"])
     script = """
     answer = Object.entries(ranges).map(([name, range]) => [0, 137, 500, 999].map((step) => {
-      const value = valueAt(name, range, step);
-      return Math.abs(stepOf(name, range, value) - step);
+      const value = valueAt(CONTROLS[name], range, step);
+      return Math.abs(stepOf(CONTROLS[name], range, value) - step);
     }));
     """
     # Values are rounded to three digits, a thousandth of a decade or more.

@@ -31,21 +31,20 @@ export function digits(value, count = 3) {
 export const lengthText = (metres, count = 3) => (metres < 1e-3 ? `${digits(metres * 1e6, count)} µm` : `${digits(metres * 1e3, count)} mm`);
 
 /** Text of a control's value, SI, with its unit. */
-export function valueText(name, value) {
-  const { unit, si, none } = CONTROLS[name];
+export function valueText({ unit, si, none }, value) {
   return value === null ? none : `${digits(value / si)} ${shownUnit(unit)}`;
 }
 
 /** Step of a slider, 0 to `STEPS`, at a value; null: at its end. */
-export function stepOf(name, [low, high], value) {
+export function stepOf({ log }, [low, high], value) {
   if (value === null) return STEPS;
-  const part = CONTROLS[name].log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+  const part = log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
   return Math.min(Math.max(part, 0), 1) * STEPS;
 }
 
 /** Value at a step of a slider, rounded as it is shown. */
-export function valueAt(name, [low, high], step) {
-  const { log, none, si } = CONTROLS[name], part = step / STEPS;
+export function valueAt({ log, none, si }, [low, high], step) {
+  const part = step / STEPS;
   if (none && step >= STEPS) return null;
   const value = log ? low * (high / low) ** part : low + (high - low) * part;
   return Number(digits(value / si)) * si;

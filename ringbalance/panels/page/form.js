@@ -8,13 +8,53 @@ export function make(tag, properties = {}, ...children) {
   return node;
 }
 
-export class Form {
+/** Sliders with unit, range and mark, by name of their control. */
+export class Sliders {
   /** `change(name, value)` is called for each value that a reader sets; `marks()` gives the values that are marked. */
+  constructor(controls, ranges, { change, marks }) {
+    Object.assign(this, { controls, ranges, change, marks, parts: {} });
+    for (const [name, control] of Object.entries(controls))
+      document.getElementById(control.further ? "further" : `controls-${control.group}`).append(this.#slider(name, control));
+  }
+
+  #slider(name, control) {
+    const id = `control-${name}`, range = this.ranges[name], { label, unit, note } = control;
+    const slider = make("input", { type: "range", id, min: 0, max: STEPS, step: 1 });
+    const output = make("output", { htmlFor: id }), mark = make("i");
+    const undo = make("button", { type: "button", className: "undo", textContent: "↺", title: "back to the marked value" });
+    undo.setAttribute("aria-label", `${label}: back to the marked value`);
+    const words = make("label", { htmlFor: id, textContent: label, title: [note, unit && `in ${shownUnit(unit)}`].filter(Boolean).join(", ") });
+    const node = make("div", { className: "control" }, words, output, undo, make("span", { className: "track" }, slider, mark));
+    const back = () => this.change(name, this.marks()[name]);
+    slider.addEventListener("input", () => this.change(name, valueAt(control, range, Number(slider.value))));
+    slider.addEventListener("dblclick", back);
+    undo.addEventListener("click", () => (back(), slider.focus()));
+    this.parts[name] = { node, slider, output, mark };
+    return node;
+  }
+
+  show(settings) {
+    const marks = this.marks();
+    for (const [name, { node, slider, output, mark }] of Object.entries(this.parts)) {
+      const control = this.controls[name], range = this.ranges[name];
+      const text = valueText(control, settings[name]), step = stepOf(control, range, settings[name]);
+      if (Math.abs(Number(slider.value) - step) >= 1) slider.value = step;
+      slider.setAttribute("aria-valuetext", text);
+      output.textContent = text;
+      mark.style.setProperty("--mark", stepOf(control, range, marks[name]) / STEPS);
+      mark.title = `marked: ${valueText(control, marks[name])}`;
+      node.classList.toggle("changed", settings[name] !== marks[name]);
+      node.hidden = Boolean(control.of && !control.of.includes(settings.algorithm));
+    }
+  }
+}
+
+/** The form of the ring's page. */
+export class Form {
   constructor(content, { change, marks }) {
-    Object.assign(this, { content, change, marks, sliders: {} });
+    this.content = content;
+    this.sliders = new Sliders(CONTROLS, content.ranges, { change, marks });
     const get = (id) => document.getElementById(id);
-    for (const [name, control] of Object.entries(CONTROLS))
-      get(control.further ? "further" : `controls-${control.group}`).append(this.#slider(name, control));
     for (const name of ["algorithm", "design", "mass"]) this[name] = get(name);
     this.algorithm.addEventListener("change", () => change("algorithm", this.algorithm.value));
     this.mass.addEventListener("change", () => change("mass", this.mass.checked));
@@ -26,35 +66,9 @@ export class Form {
     this.designFacts = get("design-facts");
   }
 
-  #slider(name, { label, unit, note }) {
-    const id = `control-${name}`, range = this.content.ranges[name];
-    const slider = make("input", { type: "range", id, min: 0, max: STEPS, step: 1 });
-    const output = make("output", { htmlFor: id }), mark = make("i");
-    const undo = make("button", { type: "button", className: "undo", textContent: "↺", title: "back to the marked value" });
-    undo.setAttribute("aria-label", `${label}: back to the marked value`);
-    const words = make("label", { htmlFor: id, textContent: label, title: [note, `in ${shownUnit(unit)}`].filter(Boolean).join(", ") });
-    const node = make("div", { className: "control" }, words, output, undo, make("span", { className: "track" }, slider, mark));
-    const back = () => this.change(name, this.marks()[name]);
-    slider.addEventListener("input", () => this.change(name, valueAt(name, range, Number(slider.value))));
-    slider.addEventListener("dblclick", back);
-    undo.addEventListener("click", () => (back(), slider.focus()));
-    this.sliders[name] = { node, slider, output, mark };
-    return node;
-  }
-
   /** Show settings. `facts`: text on the design in use. */
   show(settings, facts) {
-    const marks = this.marks();
-    for (const [name, { node, slider, output, mark }] of Object.entries(this.sliders)) {
-      const range = this.content.ranges[name], text = valueText(name, settings[name]), step = stepOf(name, range, settings[name]);
-      if (Math.abs(Number(slider.value) - step) >= 1) slider.value = step;
-      slider.setAttribute("aria-valuetext", text);
-      output.textContent = text;
-      mark.style.setProperty("--mark", stepOf(name, range, marks[name]) / STEPS);
-      mark.title = `marked: ${valueText(name, marks[name])}`;
-      node.classList.toggle("changed", settings[name] !== marks[name]);
-      node.hidden = Boolean(CONTROLS[name].of && !CONTROLS[name].of.includes(settings.algorithm));
-    }
+    this.sliders.show(settings);
     this.algorithm.value = settings.algorithm;
     this.mass.checked = settings.mass;
     this.design.value = settings.design;

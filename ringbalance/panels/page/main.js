@@ -157,10 +157,10 @@ class Panel {
     if (ended && ended !== "settled") {
       const late = run.time >= run.deadline ? ` in ${digits(run.rules.timeLimit)} s` : "", after = run.done ? " after the load" : "";
       const advice = ended === "overshooting" && run.settings.algorithm === "target_vector" ? "; lower the gain" : "";
-      return [ended, `Not settled${late}${after}: ${CAUSES[ended]}${advice} (${digits(run.amplitude * 1e6)} µm at the end, limit ${valueText("limit", run.limit)}).`];
+      return [ended, `Not settled${late}${after}: ${CAUSES[ended]}${advice} (${digits(run.amplitude * 1e6)} µm at the end, limit ${valueText(CONTROLS.limit, run.limit)}).`];
     }
     const since = Math.min(run.heldSince, run.settled ?? Infinity), passed = `${digits(since - load)} s`;
-    const within = `it stays within ${valueText("limit", run.limit)}.`;
+    const within = `it stays within ${valueText(CONTROLS.limit, run.limit)}.`;
     if (since < Infinity) return [`held ${load}`, run.done ? `Back within ${passed} after the load: ${within}` : `Settled after ${passed}: ${within}`];
     if (run.amplitude <= run.limit) return ["within", "Within the limit."];
     return ["above", "Above the limit: the valves correct."];

@@ -77,8 +77,13 @@ def inputs_of(quantity: Mapping[str, Any]) -> dict[str, float]:
 
 
 def total_of(quantity: Mapping[str, Any]) -> float:
-    """Half-width (95 %) of a quantity, the root of the sum of the squares of its parts."""
-    return math.hypot(*quantity["parts"].values())
+    """Half-width (95 %) of a quantity: from its value to the farther end of its interval.
+
+    Where the interval has no ends, the root of the sum of the squares of its parts.
+    """
+    value, ends = quantity["value"], (quantity.get("lower"), quantity.get("upper"))
+    distances = [abs(end - value) for end in ends if end is not None and value is not None]
+    return max(distances, default=math.hypot(*quantity["parts"].values()))
 
 
 def states_uncertainty(evidence: Any) -> bool:

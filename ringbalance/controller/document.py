@@ -319,12 +319,7 @@ def conventions(run: Simulation) -> tuple[Quantity, ...]:
 
 
 def _convention_rows(run: Simulation) -> Iterator[ConventionRow]:
-    """Key, name, value, unit and status of each quantity.
-
-    Down to the lowest speeds the fullest chamber keeps its liquid with the gas off, by hydrostatics: to the
-    first at any pressure of a cavity over the crest, to the second at the pressure that runs assume.  Below
-    them it runs back as the speed falls, until at two further speeds the column holds full at equal fills.
-    """
+    """Key, name, value, unit and status of each quantity."""
     scene, before, after = run.scene, float(run.amplitude[0]), float(run.amplitude[-1])
     rotor, grade = scene.rotor, scene.requirement.grade
     influence = rotor.influence_coefficient
@@ -370,7 +365,12 @@ def _convention_rows(run: Simulation) -> Iterator[ConventionRow]:
         peak = margins.sensitivity_peak
         name = f"peak sensitivity of the proportional part (zone {balancing.zone(peak)} of ISO 14839-3)"
         yield "peak_sensitivity", name, peak, "1", "ok"
+    yield from _consumption_rows(run)
+    yield from _lasting_rows(run)
 
+
+def _consumption_rows(run: Simulation) -> Iterator[ConventionRow]:
+    """Time of the first correction, and the gas and the liquid that corrections and holding take."""
     first = min((each.time + each.duration for each in run.injections if each.moved), default=None)
     corrections = len({each.time for each in run.injections})
     per_correction = run.gas.normal_volume / corrections if corrections else None
@@ -393,6 +393,14 @@ def _convention_rows(run: Simulation) -> Iterator[ConventionRow]:
     name = "holding until the lost liquid is missing for the initial unbalance"
     yield "holding_time", name, loss.holding_time, "s", code
 
+
+def _lasting_rows(run: Simulation) -> Iterator[ConventionRow]:
+    """Speeds down to which a correction lasts without gas, by hydrostatics.
+
+    Down to the lowest speeds the fullest chamber keeps its liquid with the gas off: to the first at any
+    pressure of a cavity over the crest, to the second at the pressure that runs assume.  Below them it runs
+    back as the speed falls, until at two further speeds the column holds full at equal fills.
+    """
     held = Holding.of(run.scene, fill_ratio=max(float(each[-1]) for each in run.fill_ratio.values()))
     status = "ok" if held.finding is None else held.finding.code
     for key, how_sure, speed in (

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -125,6 +125,35 @@ class Design(PresentedResult):
         return scene.with_values({path: self.point[path] for path in self.assumed}, origin="assumed")
 
 
+def _in_order(space: Space, designs: Sequence[RacedDesign], needed: float) -> list[RacedDesign]:
+    """Designs by size; if no size varies, by the energy of the gas, those last that a weaker supply stalls.
+
+    Args: `needed`: unbalance to cancel, kg m.
+    """
+    if space.sized:
+        return sorted(designs, key=lambda each: each.size)
+    supply = space.scene.gas.pressure
+    weaker = [
+        {**each.point, PRESSURE: (1 - _MOVE_FRACTION) * float(each.point.get(PRESSURE, supply))}
+        for each in designs
+    ]
+    rows = static_rows(space.scene, weaker, intervals=False)
+    stalls = [(row_reach(row) or 0.0) < needed for row in rows]
+    energy = [float(np.nanmedian(each.race.judgement.outcomes.energy)) for each in designs]
+    order = sorted(range(len(designs)), key=lambda i: (stalls[i], energy[i]))
+    return [designs[i] for i in order]
+
+
+def _size_half_width(fraction: Proportion, rise: float) -> float | None:
+    """Relative half-width (95 %) of a design's size, None where the fraction does not grow with it.
+
+    Half-width of the difference of two fractions over `rise`, their growth with the logarithm of the size,
+    and the resolution of the search.
+    """
+    apart = (fraction.high - fraction.low) / math.sqrt(2.0)
+    return math.hypot(apart / rise, AS_SMALL) if rise > 0 else None
+
+
 def run_design(
     scene: SceneFile,
     *,
@@ -163,21 +192,8 @@ def run_design(
             seed=start,
         )
         races, raced = search.races, len(search.races.candidates)
-        judged, supply = judged_designs(search), space.scene.gas.pressure
-        # If no size varies, designs that a weaker supply stalls come last.
-        weaker = [
-            {**each.point, PRESSURE: (1 - _MOVE_FRACTION) * float(each.point.get(PRESSURE, supply))}
-            for each in judged
-        ]
-        weak_rows = [] if space.sized else static_rows(space.scene, weaker, intervals=False)
-        stalls = [(row_reach(row) or 0.0) < needed for row in weak_rows] or len(judged) * [False]
-
-        def order(each: RacedDesign) -> float:
-            """Size, m^3; if no size varies, energy of the gas, J."""
-            return each.size if space.sized else float(np.nanmedian(each.race.judgement.outcomes.energy))
-
-        ordered = sorted(zip(judged, stalls, strict=True), key=lambda pair: (pair[1], order(pair[0])))
-        promising = [each for each, _ in ordered if each.race.succeeded]
+        judged = judged_designs(search)
+        promising = [each for each in _in_order(space, judged, needed) if each.race.succeeded]
         # If none meets the requirements, the design that serves most devices.
         queue = promising or sorted(judged, key=lambda each: -each.race.judgement.fraction.value)[:1]
         for _ in range(_MAX_VERDICTS):
@@ -197,11 +213,7 @@ def run_design(
             if larger is not None and (not queue or larger.size < queue[0].size):
                 queue.insert(0, larger)
         if best is not None and space.sized:
-            # Half-width of the difference of two fractions, divided by the growth with the logarithm of the
-            # size, and the resolution of the search.
-            share, rise = best.race.judgement.fraction, growth(races, best)
-            apart = (share.high - share.low) / math.sqrt(2.0)
-            doubt = math.hypot(apart / rise, AS_SMALL) if rise > 0 else None
+            doubt = _size_half_width(best.race.judgement.fraction, growth(races, best))
     reach, smaller, ranking, held = None, None, Ranking(), None
     if best is not None:
         reach = row_reach(static_rows(space.scene, [best.point], intervals=False)[0])

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from check_traces import SAME, agrees, apart, printed, traces
 
-from ringbalance.reports.traced import evidence_at, finished, marked, placed
+from ringbalance.reports.traced import evidence_at, finished, marked, placed, total_of
 from ringbalance.reports.traced import printed as traced
 from ringbalance.results.numbers import believed
 
@@ -69,3 +69,18 @@ def test_a_number_is_not_finer_than_inputs_of_which_nothing_is_said() -> None:
     assert believed(0.123456, fine, stated=True) == fine
     assert believed(0.123456, fine, stated=False) is None
     assert believed(0.123456, wide, stated=False) == wide
+
+
+@pytest.mark.parametrize(
+    ("ends", "half_width"),
+    [
+        ({"lower": 0.8, "upper": 1.1}, 0.2),
+        ({"lower": 0.8, "upper": None}, 0.2),
+        ({"lower": None, "upper": None}, 0.5),
+    ],
+)
+def test_a_half_width_on_a_page_reaches_to_the_farther_end(
+    ends: dict[str, float | None], half_width: float
+) -> None:
+    quantity = {"value": 1.0, "parts": {"numerical": 0.0, "input": 0.3, "model": 0.4}, **ends}
+    assert total_of(quantity) == pytest.approx(half_width)

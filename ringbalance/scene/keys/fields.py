@@ -99,7 +99,7 @@ def _balance_grade() -> ValueReader:
     allowed = f'a grade such as "G 2.5", or {plain.allowed}'
 
     def read(value: object) -> float:
-        grade = re.fullmatch(r"\s*G\s*([0-9.]+)\s*", value) if isinstance(value, str) else None
+        grade = re.fullmatch(r"\s*G\s*([0-9.,]+)\s*", value) if isinstance(value, str) else None
         try:
             return float(plain.read(f"{grade[1]} mm/s" if grade else value))
         except FieldError as error:

@@ -162,8 +162,9 @@ class SceneReading:
                 continue
             if self.given(name):
                 for key in keys:
-                    if self.lacks(path := f"{name}.{key}"):
-                        needs = self.schema.key_at((name, key)).presence.needs
+                    needs = self.schema.key_at((name, key)).presence.needs
+                    # What would follow from a value that cannot be read is not missing.
+                    if self.lacks(path := f"{name}.{key}") and not self.broken & {*needs}:
                         others = (need.split(".")[1] for need in needs)
                         yield self.missing(path, " or ".join(["every scene needs it", *others]))
             elif name not in self.broken:

@@ -166,6 +166,7 @@ def compared(name: str) -> Compared:
     start = time.process_time()
     design = rb.find_design(PROBLEMS[name].scene, workers=1)
     spent = time.process_time() - start
+    assert isinstance(design, rb.Design)
     best = best_of_grid(design.space)
     value = None
     if design.succeeded and design.judgement is not None:

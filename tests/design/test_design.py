@@ -32,6 +32,7 @@ from ringbalance.design.racing import Race, near, settings_at
 from ringbalance.design.space import Space
 from ringbalance.design.static import row_reach, static_rows
 from ringbalance.results.requirements import MET, MISSED, OPEN, Proportion
+from ringbalance.scene import AnyScene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 
@@ -54,9 +55,15 @@ def open_scene(vary: tuple[str, ...] = WIDTHS, **changes: Any) -> Scene:
     return changed
 
 
+def found(scene: AnyScene, **options: Any) -> rb.Design:
+    design = rb.find_design(scene, **options)
+    assert isinstance(design, rb.Design)
+    return design
+
+
 @pytest.fixture(scope="module")
 def design() -> rb.Design:
-    return rb.find_design(open_scene(requirement__fraction=0.7))
+    return found(open_scene(requirement__fraction=0.7))
 
 
 def test_the_smallest_of_a_whole_space_that_meets_what_is_required(design: rb.Design) -> None:
@@ -101,7 +108,7 @@ def test_a_denser_liquid_at_hand_is_chosen_and_named() -> None:
         for row in static_rows(scene, space.points(np.array([[0.5, 0.5, 0.5, at] for at in (0.25, 0.75)])))
     ]
     assert reaches[1] == pytest.approx(1.5 * reaches[0], rel=0.05)
-    design = rb.find_design(scene)
+    design = found(scene)
     assert design.to_dict()["parts"] == {"liquid": "dense"}
     assert design.succeeded
     assert liquid_ring_scene(design.recommended_scene).liquid.density == 1500.0
@@ -121,7 +128,7 @@ def test_the_judged_designs_are_drawn_with_the_chosen_one_and_what_is_required(
 
 def test_threads_make_no_difference(design: rb.Design) -> None:
     with ThreadPoolExecutor(2) as pool:
-        other = rb.find_design(open_scene(requirement__fraction=0.7), executor=pool)
+        other = found(open_scene(requirement__fraction=0.7), executor=pool)
     assert other.to_dict() == design.to_dict()
 
 
@@ -144,7 +151,7 @@ def test_a_design_says_how_long_it_holds_where_liquid_is_lost(design: rb.Design)
 def test_a_design_with_a_humidity_runs_over_the_hours() -> None:
     """Of these two designs no device takes gas while it holds: none loses liquid, and that is said."""
     two = ("disc.axial_width=26mm,38mm", *WIDTHS[1:])
-    design = rb.find_design(open_scene(two, requirement__fraction=0.7, gas__relative_humidity=0))
+    design = found(open_scene(two, requirement__fraction=0.7, gas__relative_humidity=0))
     assert design.endurance is not None
     assert not design.endurance.rates.any()
     assert design.to_dict()["endurance"]["interval_s"] == [None, None]
@@ -178,12 +185,12 @@ def test_a_design_says_what_its_gas_jet_digs_where_nothing_limits_it(design: rb.
 
 @pytest.mark.heavy
 def test_workers_make_no_difference(design: rb.Design) -> None:
-    of_its_own = rb.find_design(open_scene(requirement__fraction=0.7), workers=2)
+    of_its_own = found(open_scene(requirement__fraction=0.7), workers=2)
     assert of_its_own.to_dict() == design.to_dict()
 
 
 def test_an_unbalance_that_no_design_cancels_is_named() -> None:
-    none = rb.find_design(open_scene(rotor__initial_vibration={"amplitude": "80 um", "phase": "0 deg"}))
+    none = found(open_scene(rotor__initial_vibration={"amplitude": "80 um", "phase": "0 deg"}))
     document = none.to_dict()
     assert not none.succeeded
     assert document["findings"][0]["code"] == "design_none_able"
@@ -195,19 +202,19 @@ def test_an_unbalance_that_no_design_cancels_is_named() -> None:
 def test_a_rotor_without_unbalance_leaves_nothing_to_design() -> None:
     still = open_scene(rotor__initial_vibration={"amplitude": "0 um", "phase": "0 deg"})
     with pytest.raises(rb.SceneError, match=r"no unbalance that a disc could cancel.*initial_vibration"):
-        rb.find_design(still, workers=1)
+        found(still, workers=1)
 
 
 def test_designs_that_are_refused_are_counted_with_the_most_frequent_reason() -> None:
     """A valve slower than the controller's period (0.5 s), and one on whose way nothing is wrong."""
     slow = {"name": "slow", "conductance": "0.3 l/(s*bar)", "critical_ratio": 0.3, "valve_lag": "2 s"}
     sound = {**slow, "name": "sound", "valve_lag": "2 ms"}
-    none = rb.find_design(open_scene(design__valves=[slow]))
+    none = found(open_scene(design__valves=[slow]))
     all_refused, refused = none.to_dict()["findings"]
     assert (all_refused["code"], refused["code"]) == ("design_all_refused", "design_refused")
     assert refused["values"].items() >= {"count": 3, "points": 3, "reasons": 1, "most": 3}.items()
     assert "the valve has moved" in refused["values"]["text"]
-    weak = rb.find_design(open_scene((*WIDTHS[:2], "gas.pressure=0.01MPa"), design__valves=[slow, sound]))
+    weak = found(open_scene((*WIDTHS[:2], "gas.pressure=0.01MPa"), design__valves=[slow, sound]))
     flows, refused = weak.to_dict()["findings"]
     assert (flows["code"], flows["values"]["allowed"]) == ("design_none_flows", 3)
     assert refused["values"].items() >= {"count": 3, "points": 6, "reasons": 1, "most": 3}.items()
@@ -241,7 +248,7 @@ def test_all_listed_designs_that_can_work_count_as_raced(design: rb.Design) -> N
 @pytest.fixture(scope="module")
 def late() -> rb.Design:
     """No device settles that early."""
-    return rb.find_design(open_scene(requirement__settling_time="0.2 s"))
+    return found(open_scene(requirement__settling_time="0.2 s"))
 
 
 def test_the_demand_that_stands_against_every_design_is_named(late: rb.Design) -> None:
@@ -320,7 +327,7 @@ def test_an_error_in_a_file_of_valves_names_its_cell(tmp_path: Path) -> None:
     with pytest.raises(
         rb.SceneError, match=r'v\.csv: line 2, column "conductance" = "0.3 mm": "mm" is a unit'
     ):
-        rb.find_design(rb.load_scene(file))
+        found(rb.load_scene(file))
 
 
 @dataclass(frozen=True)
@@ -414,7 +421,7 @@ def test_what_cannot_be_chosen_from_is_named(tmp_path: Path, change: str, messag
     file = tmp_path / "scene.toml"
     file.write_text(f"{head}[design]\n{change}\n[uncertainty]{tail.partition('[uncertainty]')[2]}", "utf-8")
     with pytest.raises(rb.SceneError, match=message) as caught:
-        rb.find_design(rb.load_scene(file))
+        found(rb.load_scene(file))
     assert str(file) in str(caught.value)
 
 
@@ -422,13 +429,13 @@ def test_a_given_disc_is_for_tune() -> None:
     with pytest.raises(
         rb.SceneError, match=r"outer_radius.*vary.*--in-place, or `ringbalance tune`"
     ) as caught:
-        rb.find_design(rb.load_scene(rb.bundled_scene("liquid_ring_paper")))
+        found(rb.load_scene(rb.bundled_scene("liquid_ring_paper")))
     assert len(caught.value.faults) == 1
 
 
 def test_only_a_disc_with_liquid_is_designed() -> None:
     with pytest.raises(rb.SceneError, match="eccentric_mass"):
-        rb.find_design(rb.load_scene(rb.bundled_scene("eccentric_mass_paper")))
+        found(rb.load_scene(rb.bundled_scene("eccentric_mass_paper")))
 
 
 @pytest.mark.heavy

@@ -82,7 +82,7 @@ def test_the_readme_s_python_runs_outside_the_tree(tmp_path: Path, monkeypatch: 
 
 
 def test_names_that_pages_mention_exist() -> None:
-    """`ringbalance.room.module`, `ringbalance.room.module.name`, but for the group of entry points; `rb.name`."""
+    """`ringbalance.room.module`, `ringbalance.room.module.name`, `rb.name`; the group of entry points is none."""
     for page in PAGES:
         for path in re.findall(r"(?<![\w.-])ringbalance((?:\.[a-zA-Z_]\w*)+)", text(page)):
             if f"ringbalance{path}" == GROUP:

@@ -82,7 +82,7 @@ def test_the_readme_s_python_runs_outside_the_tree(tmp_path: Path, monkeypatch: 
 
 
 def test_names_that_pages_mention_exist() -> None:
-    """`ringbalance.room.module`, `ringbalance.room.module.name`, `rb.name`; the group of entry points is none."""
+    """`ringbalance.room.module` and `ringbalance.room.module.name`, and `rb.name`; not the entry points."""
     for page in PAGES:
         for path in re.findall(r"(?<![\w.-])ringbalance((?:\.[a-zA-Z_]\w*)+)", text(page)):
             if f"ringbalance{path}" == GROUP:

@@ -32,6 +32,7 @@ from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.jobs import Job, answers_of
 from ringbalance.scene.platform.memory import seldom_collected
 from ringbalance.scene.platform.processes import Workers, beside
+from ringbalance.scene.registry import registered_or_none
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.runner import paper_scene
 
@@ -67,7 +68,9 @@ def _views(path: Path, balancer: str, pool: Workers | None) -> Iterator[tuple[st
     """Views of all sections and of the cases, by name. Args: `path`: file of the evidence."""
     # The cases have most figures.
     names = (CASES_VIEW, *sections_of(balancer))
-    return answers_of([Job(name=name, do=partial(_view_at, name, path)) for name in names], pool)
+    # Sections that a balancer brings itself may be unknown to other processes.
+    beside_this = pool if registered_or_none("report", balancer) is None else None
+    return answers_of([Job(name=name, do=partial(_view_at, name, path)) for name in names], beside_this)
 
 
 def _view_at(name: str, path: Path) -> Record | None:

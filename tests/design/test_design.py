@@ -433,11 +433,6 @@ def test_a_given_disc_is_for_tune() -> None:
     assert len(caught.value.faults) == 1
 
 
-def test_only_a_disc_with_liquid_is_designed() -> None:
-    with pytest.raises(rb.SceneError, match="eccentric_mass"):
-        found(rb.load_scene(rb.bundled_scene("eccentric_mass_paper")))
-
-
 @pytest.mark.heavy
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_a_design_is_the_best_of_a_whole_grid_or_says_why_there_is_none(name: str) -> None:

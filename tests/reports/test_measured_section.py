@@ -50,8 +50,8 @@ def fitted(evidence: dict[str, Any]) -> dict[str, Any]:
 @pytest.mark.usefixtures("unwritten")
 def test_report_and_annex_of_a_fitted_scene_name_its_measurements(fitted: dict[str, Any]) -> None:
     pages = render(fitted)
-    assert "Fitted to 31 measurements of this device" in pages["report.html"]
-    assert "No comparison with measurements of this device exists" not in pages["report.html"]
+    assert "fitted to 31 measurements of this device" in pages["report.html"]
+    assert "no measurement of this device is compared" not in pages["report.html"]
     section = pages["annex.html"].split('id="measured"')[1].split("<section")[0]
     text = " ".join(re.sub(r"<[^>]+>", " ", section).split())
     assert "fitted to 31 measurements" in text

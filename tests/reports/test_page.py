@@ -169,7 +169,7 @@ def test_the_same_evidence_gives_the_same_pages(evidence: Record, pages: dict[st
 
 
 CHANGES: tuple[tuple[tuple[Any, ...], Any, str], ...] = (
-    (("calibration", "quantities", "lambda", "value"), 0.06543, "65.43"),
+    (("calibration", "quantities", "lambda", "value"), 0.07224, "72.24"),
     (("calibration", "quantities", "drag_coefficient", "value"), 7.77, "7.8"),
     (("calibration", "quantities", "stall_pressure", "value"), 0.379e6, "0.379"),
     (("paper", "drag_coefficient"), 41.0, "about 41"),

@@ -22,6 +22,11 @@ class EccentricLoop:
     Imbalance filter: state (x, y, x', y', U_x, U_y) along the rotor's axes, samples (x, y, x', y').
     Friction filter of each mass: state (rate, friction arm), linear about the drive speed and the scene's
     arms, with the rate as sample.
+
+    Example:
+        >>> loop = rb.eccentric_loop(rb.load_scene("eccentric_mass_paper"))
+        >>> isinstance(loop, rb.EccentricLoop), loop.targets.shape
+        (True, (2,))
     """
 
     speed: FloatArray

@@ -348,7 +348,7 @@ def _quantities(scene: Scene, loop: LoopFactor, margins: Margins | None) -> Iter
             ("phase_margin", "phase margin", "rad", margins.phase),
             (
                 "disk_gain_margin",
-                "disk margin, factor, of the proportional part",
+                "disk margin of P alone, factor",
                 "1",
                 finite(margins.disk_gain_factor),
             ),

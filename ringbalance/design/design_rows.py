@@ -18,7 +18,9 @@ from ringbalance.controller.judging.tuning import (
     reported_findings,
     reported_quantities,
     required_table,
+    time_findings,
 )
+from ringbalance.design.axes import Point
 from ringbalance.design.designing import PRESSURE, Design
 from ringbalance.design.space import VALVE
 from ringbalance.results.numbers import MISSING, format_given, percent
@@ -27,7 +29,7 @@ from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.describe import setting_text
-from ringbalance.scene.origins import raw_value_at
+from ringbalance.scene.origins import SceneFile, raw_value_at
 
 CODES: Final = {MET: "design_met", MISSED: "design_missed", OPEN: "design_open"}
 _EDGES: Final = {
@@ -127,6 +129,14 @@ def _quantities(design: Design) -> Iterator[Quantity]:
     )
 
 
+def verdict_findings(scene: SceneFile, point: Point, judgement: Judgement) -> Iterator[Finding]:
+    """Findings on the verdict of a design, with its changes of the scene, and on the settling times."""
+    changes = {path: value for path, value in point.items() if isinstance(value, float | int | str)}
+    code = CODES[judgement.verdict] + if_exact(scene, judgement)
+    yield Finding(code=code, values=judgement.sentence_values, change=changes)
+    yield from time_findings(judgement)
+
+
 def _findings(design: Design) -> Iterator[Finding]:
     static, judgement = design.static, design.judgement
     counted = {"points": static.points, "able": static.able, "raced": design.raced}
@@ -138,13 +148,7 @@ def _findings(design: Design) -> Iterator[Finding]:
         yield Finding(code="design_none_able" if reach else without, values={**values, "allowed": allowed})
         yield from _refusals(static.refusals, static.points)
         return
-    changes = {path: value for path, value in design.point.items() if isinstance(value, float | int | str)}
-    code = CODES[judgement.verdict] + if_exact(design.given, judgement)
-    yield Finding(code=code, values=judgement.sentence_values, change=changes)
-    times = judgement.settling_times
-    if times["p50"] is not None:
-        code = "tuned_half" if times["p90"] is None else "tuned_times"
-        yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
+    yield from verdict_findings(design.given, design.point, judgement)
     yield from reported_findings(judgement)
     if design.endurance is not None:
         yield design.endurance.finding

@@ -2,9 +2,9 @@
 
 The moment 2 m_b r_b follows from the imbalances of random devices, a mass is no lighter than the motor that
 travels with it, and its length goes with the cube root of its mass.  Of each motor the gear is taken whose
-smaller margin, of torque or speed, is largest; gains follow from the drives' inertia.  The lightest designs
-are run; the lightest that serves enough devices gets settings by the search of `tune`, and is judged on
-devices that took no part.
+smaller ratio to the need, of torque or speed, is largest; gains follow from the drives' inertia.  The
+lightest designs are run; the lightest that serves enough devices gets settings by the search of `tune`, and
+is judged on devices that took no part.
 """
 
 from __future__ import annotations
@@ -41,16 +41,17 @@ from ringbalance.controller.judging.judge import (
 )
 from ringbalance.controller.judging.ranking import Ranking, ranked
 from ringbalance.controller.judging.search import searched
-from ringbalance.controller.judging.tuning import if_exact, required_table
+from ringbalance.controller.judging.tuning import required_table
 from ringbalance.controller.trials import rounded
 from ringbalance.design.axes import Point
 from ringbalance.design.choices import NAME, read_choices
-from ringbalance.design.design_rows import CODES, misses
+from ringbalance.design.design_rows import misses, verdict_findings
 from ringbalance.design.races import deal
 from ringbalance.results.numbers import format_given, percent
 from ringbalance.results.requirements import MET, MISSED
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
+from ringbalance.scene.arrays import finite
 from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.keys.declaration import keys_of
@@ -86,8 +87,8 @@ class MassCandidate:
     """Changes of the scene, SI."""
     moving: float
     """Mass of both masses, motors included, kg."""
-    margin: float
-    """Smaller of the margins of torque and speed; below 1: not enough."""
+    drive_over_need: float
+    """Smaller of the ratios of torque and of speed to what is needed; infinite without a largest voltage."""
     against: Finding | None
     """Reason why it is not run; None: it can be."""
     judgement: Judgement | None = None
@@ -153,7 +154,7 @@ class MassDesign(Result):
                     "motor": each.motor,
                     "changes": plain_settings(each.point),
                     "moving_mass_kg": each.moving,
-                    "drive_over_need": _MARGIN * each.margin if math.isfinite(each.margin) else None,
+                    "drive_over_need": finite(each.drive_over_need),
                     "against": each.against and each.against.text,
                     "fraction": each.judgement and each.judgement.fraction.document(),
                 }
@@ -190,7 +191,7 @@ class MassDesign(Result):
                 setting_text("masses.guide_radius", each.point["masses.guide_radius"]),
                 setting_text("masses.mass", each.point["masses.mass"]),
                 str(each.point["motor.teeth"][0]),
-                format_given(_MARGIN * each.margin if math.isfinite(each.margin) else None, "1", digits=2),
+                format_given(finite(each.drive_over_need), "1", digits=2),
                 percent(each.judgement.fraction.value)
                 if each.judgement
                 else (each.against.code if each.against else "not run").replace("_", " "),
@@ -217,7 +218,7 @@ class MassDesign(Result):
                 (
                     "drive_over_need",
                     "torque or speed of the drives over what is needed",
-                    _MARGIN * self.best.margin,
+                    self.best.drive_over_need,
                     "1",
                 ),
             ):
@@ -231,16 +232,9 @@ class MassDesign(Result):
         if judgement is None:
             yield Finding(code="mass_design_none", values={"points": len(self.candidates)})
         else:
-            code = CODES[judgement.verdict] + if_exact(self.scene, judgement)
-            values: dict[str, Value] = judgement.sentence_values
-            changes = {p: v for p, v in self.point.items() if isinstance(v, float | int | str)}
-            yield Finding(code=code, values=values, change=changes)
-            times = judgement.settling_times
-            if times["p50"] is not None:
-                code = "tuned_half" if times["p90"] is None else "tuned_times"
-                yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
+            yield from verdict_findings(self.scene, self.point, judgement)
             ran = sum(each.judgement is not None for each in self.candidates)
-            values = {"points": len(self.candidates), "able": able, "raced": ran}
+            values: dict[str, Value] = {"points": len(self.candidates), "able": able, "raced": ran}
             yield Finding(code="mass_design_looked", values=values)
             if not self.succeeded:
                 yield from misses(judgement, self.ranking)
@@ -273,7 +267,7 @@ def design_masses(
     motors: Sequence[MotorAtHand | None] = _motors(scene) or (None,)
     candidates = sorted(
         (_candidate(scene, motor, radius, needed) for motor in motors for radius in radii),
-        key=lambda each: (each.against is not None, each.moving, -each.margin),
+        key=lambda each: (each.against is not None, each.moving, -each.drive_over_need),
     )
     able = [i for i, each in enumerate(candidates) if each.against is None][:_MOST_RUN]
     required = balancer_of(scene).required_fraction()
@@ -364,18 +358,18 @@ def _candidate(
     geared = {
         teeth: with_values_at(scene, {**point, "motor.teeth": (teeth, second, third)}) for teeth in gears
     }
-    margins = {teeth: _drive_margin(each) for teeth, each in geared.items()}
-    teeth = max(margins, key=lambda each: margins[each])
+    ratios = {teeth: _drive_over_need(each) for teeth, each in geared.items()}
+    teeth = max(ratios, key=lambda each: ratios[each])
     point["motor.teeth"] = [teeth, second, third]
     against = None
-    most, margin = scene.design.mass, margins[teeth]
+    most, drive_over_need = scene.design.mass, ratios[teeth]
     try:
         if most is not None and mass > most:
             values: dict[str, Value] = {"mass": mass, "most": most, "radius": radius}
             against = Finding(code="mass_too_heavy", values=values)
-        elif margin < 1:
+        elif drive_over_need < _MARGIN:
             name = motor.name if motor else "of the scene"
-            values = {"name": name, "over": _MARGIN * margin, "least": _MARGIN, "teeth": teeth}
+            values = {"name": name, "over": drive_over_need, "least": _MARGIN, "teeth": teeth}
             against = Finding(code="motor_too_weak", values=values)
         residual = required_residual(geared[teeth])
         if residual is not None:
@@ -390,17 +384,21 @@ def _candidate(
     except SceneError as error:
         against = against or Finding(code="mass_design_refused", values={"text": str(error.faults[0])})
     return MassCandidate(
-        motor=motor.name if motor else "", point=point, moving=2 * mass, margin=margin, against=against
+        motor=motor.name if motor else "",
+        point=point,
+        moving=2 * mass,
+        drive_over_need=drive_over_need,
+        against=against,
     )
 
 
-def _drive_margin(scene: EccentricScene) -> float:
-    """Smaller of stall torque and of speed without load, each over what is needed with a margin."""
+def _drive_over_need(scene: EccentricScene) -> float:
+    """Smaller of stall torque and of speed without load, each over what is needed."""
     plant, stall = PlantParameters.of(scene), stall_ratio(scene)
     fastest = max(scene.friction_filter.drive_speed, _FASTEST_MOVE_RAD_S)
     back_emf = plant.back_emf_constant * plant.gear_ratio
     free = plant.maximum_voltage / (back_emf * fastest) if back_emf else math.inf
-    return min(math.inf if stall is None else stall, free) / _MARGIN
+    return min(math.inf if stall is None else stall, free)
 
 
 def _looked_at(scene: EccentricScene, point: Point) -> Judgement | None:

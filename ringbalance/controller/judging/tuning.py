@@ -271,11 +271,9 @@ class Tuning(Result):
         code = _VERDICT_CODES[best.verdict] + if_exact(self.given, best)
         values = {**best.sentence_values, "part": " and an ideal valve" if self.open_choice else ""}
         yield Finding(code=code, values=values, change=changes)
-        times = best.settling_times
         # With parts that can be bought the times are among the quantities, of the part.
-        if times["p50"] is not None and not self.choices:
-            code = "tuned_half" if times["p90"] is None else "tuned_times"
-            yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
+        if not self.choices:
+            yield from time_findings(best)
         yield from reported_findings(best)
         if unchanged is None:
             yield Finding(code="tuned_own_none")
@@ -330,6 +328,14 @@ def reported_quantities(judgement: Judgement) -> Iterator[Quantity]:
     if (crater := judgement.crater_reached) is not None:
         name = "crater over the ring in nine tenths at most"
         yield Quantity(key="crater_reached", name=name, value=crater, origin="simulated", digits=2)
+
+
+def time_findings(judgement: Judgement) -> Iterator[Finding]:
+    """Finding on the times within which half and nine tenths settle; none where less than half do."""
+    times = judgement.settling_times
+    if times["p50"] is not None:
+        code = "tuned_half" if times["p90"] is None else "tuned_times"
+        yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
 
 
 def reported_findings(judgement: Judgement) -> Iterator[Finding]:

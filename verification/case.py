@@ -32,6 +32,8 @@ CAUSES: Final[Mapping[str, str]] = MappingProxyType(
         "eccentric_masses": "own mass of the eccentric masses left out",
         "friction": "friction left to the regulator",
         "force": "force of the turning masses left out",
+        "drives": "drives taken to hold the masses",
+        "cost": "neither vibration nor power in the cost",
     }
 )
 """Common causes of a claim's departure, as readers see them."""

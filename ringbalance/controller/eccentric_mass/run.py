@@ -185,7 +185,7 @@ def _substeps_of(scene: EccentricScene) -> float:
                 "N/m",
             ),
             (
-                plant.damping / plant.mass,
+                0.5 * plant.damping / plant.mass,
                 "rotor.damping",
                 plant.damping,
                 plant.mass * rate,

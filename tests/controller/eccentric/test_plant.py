@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from eccentric_runs import bundled
 from plant_runs import rest_state, row_of, run_steps, stuck_flags
 from scipy.integrate import solve_ivp
 
@@ -162,6 +163,24 @@ def test_the_order_is_five(parameters: PlantParameters) -> None:
     orders = np.log2(errors[:-1] / errors[1:])
     assert np.all(np.abs(orders - 5) < 0.2), orders
     assert errors[-1] < 2e-9
+
+
+def test_half_the_substep_moves_nothing_that_counts() -> None:
+    """On the stiffest bundled rotor, from rest, through breakaway and the rotor's transient."""
+    plant, count = PlantParameters.of(bundled("driven_masses_small")), 25
+    speed, start = np.array([1047.2]), (rest_state((0.0, math.pi)), stuck_flags(SLIDING))
+    parts = machine.substeps(plant, 1047.2, 0.0, 1e-3)
+
+    def end(divided: int) -> FloatArray:
+        commands = np.tile([12.0, -9.0], (divided * count, 1))
+        states, _ = run_steps(plant, np.zeros(1), speed, *start, commands, 1e-3 / divided)
+        return np.asarray(states[-1])
+
+    fine, coarse = end(2 * parts), end(1)
+    assert parts > 20
+    assert abs(fine[4]) > 0.01
+    np.testing.assert_allclose(coarse[4:6], fine[4:6], atol=1e-8)
+    assert np.abs(coarse[:2] - fine[:2]).max() < 1e-5 * np.abs(fine[:2]).max()
 
 
 def test_electrical_energy_is_the_integral_of_power(parameters: PlantParameters) -> None:

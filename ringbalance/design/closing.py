@@ -66,8 +66,12 @@ def judged_designs(hunt: Hunt) -> list[RacedDesign]:
         two = np.lexsort((-logits, -np.maximum(gains, _MIN_GAIN)))[:2]
         chosen = points.some(two.tolist())
         if not (gains[two] > _MIN_GAIN).any():
-            if judged:
+            if math.isfinite(smallest):
                 break
+            if judged:
+                # Nothing about this size promises to meet the requirement: larger ones.
+                size *= _FIRST_LIMIT
+                continue
             # No design promises to meet the requirement: judge the two that came nearest.
             order = sorted(range(len(races.candidates)), key=lambda i: races.candidates[i].race.order)
             chosen = races.points.some(order[:2])
@@ -83,7 +87,8 @@ def judged_designs(hunt: Hunt) -> list[RacedDesign]:
         for i, judgement in enumerate(deal(races.executor, calls)):
             if judgement is not None:
                 judged.append(races.add(chosen, i, Race(grid_point=grid_points[i], judgement=judgement)))
-        largest = max(races.space.size(point) for point in chosen.points)
+        # Designs that missed at a small size say nothing against the expected one.
+        largest = max(size, *(races.space.size(point) for point in chosen.points))
         size = min((each.size for each in judged if each.race.succeeded), default=largest)
     return _sharpened(races, judged)
 

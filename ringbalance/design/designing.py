@@ -208,7 +208,7 @@ def run_design(
                 break
             # The next one in order, or the same one larger if that is smaller.
             larger = None
-            if judgement is not None and space.sized and promising:
+            if judgement is not None and space.sized:
                 larger = enlarged(races, best, judgement.fraction.value)
             if larger is not None and (not queue or larger.size < queue[0].size):
                 queue.insert(0, larger)

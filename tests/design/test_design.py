@@ -356,7 +356,8 @@ class Line:
     def judgement(self, size: float) -> Any:
         fraction = self.fraction(size)
         verdict = MET if fraction >= self.races.threshold else MISSED
-        return SimpleNamespace(fraction=SimpleNamespace(value=fraction), verdict=verdict, settings={})
+        ran = SimpleNamespace(value=fraction)
+        return SimpleNamespace(fraction=ran, verdict=verdict, settings={}, meets=np.ones(64, dtype=bool))
 
     def design(self, share: float, judgement: Any = None) -> RacedDesign:
         points = self.races.able(np.array([[share, 0.5, 0.5]]))
@@ -401,6 +402,33 @@ def test_the_last_designs_judged_lie_between_one_that_misses_and_one_that_meets(
     best = min(each.size for each in _sharpened(line.races, judged) if each.race.succeeded)
     assert judged[1].size > 1.025 * smallest
     assert smallest <= best <= 1.012 * smallest
+
+
+def test_designs_that_miss_at_a_small_size_do_not_lower_the_expected_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A surface that hopes too much of small discs once led the search away from those that do."""
+    line = Line.of()
+    hopeful = Mock(
+        logits=lambda places: (4.4 + line.steepness * (places[:, 0] - 0.5), np.full(len(places), 0.3))
+    )
+    monkeypatch.setattr(Races, "surface", lambda _: hopeful)
+    monkeypatch.setattr(
+        closing, "judged_design", lambda _scene, point, **_: line.judgement(line.races.space.size(point))
+    )
+    monkeypatch.setattr(closing, "tuned_settings", lambda *_: {})
+    expected: list[str] = []
+    monkeypatch.setattr(line.races, "report_progress", expected.append)
+    middle = line.judged(0.3)
+    assert not middle.race.succeeded
+    line.races.candidates.append(middle)
+    line.races.wide = middle.shares[np.newaxis]
+    hunt = SimpleNamespace(races=line.races, complete=False, size=middle.size)
+    judged = closing.judged_designs(hunt)  # type: ignore[arg-type]
+    assert not any(each.race.succeeded for each in judged)
+    sizes = [float(each.split("about ")[1].split()[0]) for each in expected if "about" in each]
+    assert len(sizes) == closing._MAX_ROUNDS
+    assert min(sizes) == pytest.approx(1e6 * middle.size, rel=1e-3)
 
 
 @pytest.mark.parametrize(

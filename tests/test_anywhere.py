@@ -53,6 +53,19 @@ def test_a_misspelt_name_is_guessed(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         rb.load_scene(f"elsewhere/{NAME}")
 
 
+@pytest.mark.parametrize("typed", [NAME, f"{NAME}/"])
+def test_a_folder_of_a_scenes_name_is_no_scene_and_the_scene_is_named(
+    typed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As after `--out liquid_ring_paper`; what the sentence names is loaded beside the folder."""
+    monkeypatch.chdir(tmp_path)
+    Path(NAME).mkdir()
+    words = rf'this is a folder, .* comes with the program \(as "{NAME}.toml"\)'
+    with pytest.raises(rb.SceneError, match=words):
+        rb.load_scene(typed)
+    assert rb.load_scene(f"{NAME}.toml").source == f"{NAME}.toml"
+
+
 def test_commands_run_on_a_scene_of_the_program(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -69,8 +69,8 @@ class Side:
     """Status of the first traced run that did not settle, else of the first traced run."""
     energy_kind: str
     """Code of the sentence that names the energy counted."""
-    sampling_time: float
-    """Time from one vibration sample to the next, s."""
+    sampling_time: float | None
+    """Time from one vibration sample to the next, s; None: it takes no samples."""
     models_used: tuple[ModelUsed, ...] = ()
     """Physical terms with model and estimated contribution, for a liquid ring."""
     within: Demand | None = None
@@ -133,10 +133,11 @@ class Side:
         )
         yield Quantity(
             key=f"{prefix}sampling_time",
-            name="vibration sampled every",
+            name="time between samples of the vibration",
             unit="s",
             value=self.sampling_time,
             origin="given",
+            status="ok" if self.sampling_time else "not_sampled",
         )
 
 
@@ -336,7 +337,7 @@ def compare(
                     worst_amplitude=float(np.median([run.worst_amplitude for run in traced])),
                     status=shown.run.status,
                     energy_kind=balancer.energy_kind,
-                    sampling_time=balancer.sampling_time(),
+                    sampling_time=balancer.sampling_time() or None,
                     models_used=tuned.models_used,
                     within=demand,
                 )

@@ -102,14 +102,25 @@ def with_valves(scene: AnyScene, file: Path) -> AnyScene:
 
     Raises: SceneError: every error of the file; or a scene without a liquid ring.
     """
-    declared = keys_of(Valve)
-    rows = read_choices(file, table="gas", keys={name: declared[name] for name in declared if name != NAME})
-    names = rows.names or tuple(f"valve {number}" for number in range(1, len(rows.rows) + 1))
-    valves = [
+    return with_choices(liquid_ring_scene(scene), file, Valve, among="design.valves", table="gas")
+
+
+def with_choices(scene: AnyScene, file: Path, kind: type, *, among: str, table: str = "") -> AnyScene:
+    """The scene with the parts of a CSV file in place of its own, such as among="design.valves".
+
+    Args: `kind`: record of a part. `table`: table of the scene that has its keys; default `among`.
+    Raises: SceneError: every error of the file.
+    """
+    part, keys = among.rpartition(".")[2].removesuffix("s"), keys_of(kind)
+    content = read_choices(
+        file, table=table or among, keys={name: keys[name] for name in keys if name != NAME}
+    )
+    names = content.names or tuple(f"{part} {number}" for number in range(1, len(content.rows) + 1))
+    parts = [
         {NAME: name, **{key: value for key, value in row.items() if value is not None}}
-        for name, row in zip(names, rows.rows, strict=True)
+        for name, row in zip(names, content.rows, strict=True)
     ]
-    return liquid_ring_scene(scene).with_values({"design.valves": valves, "design.valve_file": None})
+    return scene.with_values({among: parts, f"design.{part}_file": None})
 
 
 def as_toml(text: str, reader: ValueReader) -> Any:

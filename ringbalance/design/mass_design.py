@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -44,7 +44,7 @@ from ringbalance.controller.judging.search import searched
 from ringbalance.controller.judging.tuning import required_table
 from ringbalance.controller.trials import rounded
 from ringbalance.design.axes import Point
-from ringbalance.design.choices import NAME, read_choices
+from ringbalance.design.choices import with_choices
 from ringbalance.design.design_rows import misses, verdict_findings
 from ringbalance.design.races import deal
 from ringbalance.results.numbers import format_given, percent
@@ -54,7 +54,6 @@ from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import SceneError
-from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.origins import raw_value_at, with_values_at
 from ringbalance.scene.platform.processes import beside
 
@@ -94,6 +93,11 @@ class MassCandidate:
     judgement: Judgement | None = None
     """Judgement on few devices with the gains of the design; None: it was not run."""
 
+    @property
+    def fraction(self) -> float:
+        """Fraction of the few devices that meet every demand; -1 without a run."""
+        return self.judgement.fraction.value if self.judgement else -1.0
+
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class MassDesign(Result):
@@ -114,6 +118,7 @@ class MassDesign(Result):
     best: MassCandidate | None
     """The design, or the nearest one; None: nothing can be run."""
     judgement: Judgement | None
+    """Judgement of the best on devices that took no part; None: as for `best`."""
     ranking: Ranking
 
     @property
@@ -144,7 +149,7 @@ class MassDesign(Result):
             "reach_kg_m": reach_of(self.recommended_scene) if judgement else None,
             "motor": self.best.motor if self.best else "",
             "moving_mass_kg": self.best.moving if self.best else None,
-            "changes": plain_settings(self.point) if judgement else {},
+            "changes": plain_settings(self.point),
             "settings": plain_settings(judgement.settings) if judgement else {},
             "asked": judgement.required_fraction if judgement else None,
             **(judgement.document() if judgement else {"verdict": MISSED, "fraction": None}),
@@ -166,81 +171,61 @@ class MassDesign(Result):
 
     def rows(self) -> Rows:
         """The design, what it must do, and the alternatives."""
-        scene, judgement, tables = self.scene, self.judgement, list[Table]()
-        if judgement is not None:
-            changes = {**self.point, **judgement.settings}
-            rows = [
+        scene, best, judgement, tables = self.scene, self.best, self.judgement, list[Table]()
+        needed = "imbalance of nearly all devices, with a margin"
+        quantities = [Quantity(key="needed_unbalance", name=needed, value=self.needed, unit="kg m")]
+        counts = {"points": len(self.candidates), "able": sum(not each.against for each in self.candidates)}
+        findings = [Finding(code="mass_design_none", values={"points": counts["points"]})]
+        if best is not None and judgement is not None:
+            met, reach = "devices that meet what is required", reach_of(self.recommended_scene)
+            over = "torque or speed of the drives over what is needed"
+            quantities = [
+                Quantity.of_fraction(judgement.fraction, key="fraction_met", name=met),
+                Quantity(
+                    key="moving_mass", name="both masses, motors included", value=best.moving, unit="kg"
+                ),
+                Quantity(key="reach", name="cancels in any direction", value=reach, unit="kg m"),
+                Quantity(key="drive_over_need", name=over, value=best.drive_over_need),
+                *quantities,
+            ]
+            quantities = [each for each in quantities if each.value != math.inf]
+            counts["raced"] = sum(each.judgement is not None for each in self.candidates)
+            findings = [
+                *verdict_findings(scene, best.point, judgement),
+                Finding(code="mass_design_looked", values={**counts}),
+                *(() if self.succeeded else misses(judgement, self.ranking)),
+            ]
+            changes = [
                 (path, setting_text(path, raw_value_at(scene, path)), setting_text(path, value))
-                for path, value in changes.items()
+                for path, value in {**best.point, **judgement.settings}.items()
             ]
-            tables += [
-                Table(caption="Design", heads=("key", "the scene's", "designed"), rows=rows),
-                required_table(judgement),
-            ]
-        heads = (
-            "motor",
-            "guide radius",
-            "each mass",
-            "teeth of A",
-            "drive over need",
-            "devices that meet all",
-        )
+            keys = "key", "the scene's", "designed"
+            tables = [Table(caption="Design", heads=keys, rows=changes), required_table(judgement)]
+        reasons = Counter(each.against.text for each in self.candidates if each.against)
+        findings += [
+            Finding(code="mass_design_against", values={"count": count, "text": text})
+            for text, count in reasons.most_common(2 if judgement is None else 1)
+        ]
         alternatives = [
             (
                 each.motor or "the scene's",
-                setting_text("masses.guide_radius", each.point["masses.guide_radius"]),
-                setting_text("masses.mass", each.point["masses.mass"]),
+                *(setting_text(path, each.point[path]) for path in ("masses.guide_radius", "masses.mass")),
                 str(each.point["motor.teeth"][0]),
                 format_given(finite(each.drive_over_need), "1", digits=2),
-                percent(each.judgement.fraction.value)
+                percent(each.fraction)
                 if each.judgement
                 else (each.against.code if each.against else "not run").replace("_", " "),
             )
             for each in self.candidates
         ]
+        heads = "motor", "guide radius", "each mass", "teeth of A", "drive over need", "devices that meet all"
         caption = "Alternatives, the lightest first; few devices, with the gains of the design"
-        tables.append(Table(caption=caption, heads=heads, rows=alternatives))
         return Rows(
             title=f"Design for {scene.name} ({scene.source})",
-            quantities=tuple(self._quantities()),
-            findings=tuple(self._findings()),
-            tables=tuple(tables),
+            quantities=tuple(quantities),
+            findings=tuple(findings),
+            tables=(*tables, Table(caption=caption, heads=heads, rows=alternatives)),
         )
-
-    def _quantities(self) -> Iterator[Quantity]:
-        if self.judgement is not None and self.best is not None:
-            name = "devices that meet what is required"
-            yield Quantity.of_fraction(self.judgement.fraction, key="fraction_met", name=name)
-            reach = reach_of(self.recommended_scene)
-            for key, name, value, unit in (
-                ("moving_mass", "both masses, motors included", self.best.moving, "kg"),
-                ("reach", "cancels in any direction", reach, "kg m"),
-                (
-                    "drive_over_need",
-                    "torque or speed of the drives over what is needed",
-                    self.best.drive_over_need,
-                    "1",
-                ),
-            ):
-                if math.isfinite(value):
-                    yield Quantity(key=key, name=name, value=value, unit=unit, digits=4)
-        name = "imbalance of nearly all devices, with a margin"
-        yield Quantity(key="needed_unbalance", name=name, value=self.needed, unit="kg m", digits=4)
-
-    def _findings(self) -> Iterator[Finding]:
-        judgement, able = self.judgement, sum(each.against is None for each in self.candidates)
-        if judgement is None:
-            yield Finding(code="mass_design_none", values={"points": len(self.candidates)})
-        else:
-            yield from verdict_findings(self.scene, self.point, judgement)
-            ran = sum(each.judgement is not None for each in self.candidates)
-            values: dict[str, Value] = {"points": len(self.candidates), "able": able, "raced": ran}
-            yield Finding(code="mass_design_looked", values=values)
-            if not self.succeeded:
-                yield from misses(judgement, self.ranking)
-        reasons = Counter(each.against.text for each in self.candidates if each.against)
-        for text, count in reasons.most_common(2 if judgement is None else 1):
-            yield Finding(code="mass_design_against", values={"count": count, "text": text})
 
 
 def design_masses(
@@ -256,26 +241,24 @@ def design_masses(
     """
     report = progress or (lambda _: None)
     if not scene.imbalance.mass or not starting_speed(scene):
-        problem, allowed = (
-            "there is no imbalance that masses could cancel",
-            "a turning rotor with an imbalance",
-        )
+        problem, allowed = "no imbalance that masses could cancel", "a turning rotor with an imbalance"
         raise SceneError.of_file(scene.file, problem, allowed)
     needed = _SPARE * float(np.quantile(imbalance_ratios(scene), _QUANTILE)) * reach_of(scene)
     largest = scene.design.guide_radius
     radii = [scene.masses.guide_radius] if largest is None else [rounded(each * largest) for each in _RADII]
-    motors: Sequence[MotorAtHand | None] = _motors(scene) or (None,)
+    at_hand: Sequence[MotorAtHand] = scene.design.motors
+    if (file := scene.design.motor_file) is not None:
+        folder = scene.checked.folder if scene.checked else None
+        with_file = with_choices(scene, (folder or Path()) / file, MotorAtHand, among="design.motors")
+        at_hand = eccentric_scene(with_file).design.motors
     candidates = sorted(
-        (_candidate(scene, motor, radius, needed) for motor in motors for radius in radii),
+        (_candidate(scene, motor, radius, needed) for motor in at_hand or (None,) for radius in radii),
         key=lambda each: (each.against is not None, each.moving, -each.drive_over_need),
     )
+
+    # The lightest run on few devices, until designs of a batch serve enough of them.
     able = [i for i, each in enumerate(candidates) if each.against is None][:_MOST_RUN]
-    required = balancer_of(scene).required_fraction()
-
-    def serving() -> list[int]:
-        ran = [(i, each.judgement) for i, each in enumerate(candidates) if each.judgement]
-        return [i for i, each in ran if each.fraction.value >= required]
-
+    required, serving = balancer_of(scene).required_fraction(), list[MassCandidate]()
     with beside(workers + 1 if executor is None and workers > 1 else 1) as pool:
         for first in range(0, len(able), _BATCH):
             batch = able[first : first + _BATCH]
@@ -283,14 +266,16 @@ def design_masses(
             calls = [partial(_looked_at, scene, candidates[i].point) for i in batch]
             for i, judgement in zip(batch, deal(executor or pool, calls), strict=True):
                 candidates[i] = replace(candidates[i], judgement=judgement)
-            if serving():
+            serving = [each for each in candidates if each.fraction >= required]
+            if serving:
                 break
-    ran = [each for each in candidates if each.judgement]
-    nearest = sorted(ran, key=lambda each: -each.judgement.fraction.value if each.judgement else 0.0)[:1]
+    nearest = sorted((each for each in candidates if each.judgement), key=lambda each: -each.fraction)[:1]
+
+    # Fresh devices judge the lightest, each with the settings of a search, until one meets the requirement.
     best: MassCandidate | None = None
     verdict: Judgement | None = None
     ranking = Ranking()
-    for best in [candidates[i] for i in serving()][:_MOST_VERDICTS] or nearest:
+    for best in serving[:_MOST_VERDICTS] or nearest:
         balancer = balancer_of(scene.with_values(best.point))
         settings = best_of(balancer, [searched(balancer, progress=report), {}], progress=report)
         (verdict,) = judged_all(balancer, [settings], progress=report)
@@ -307,98 +292,69 @@ def design_masses(
     )
 
 
-def _motors(scene: EccentricScene) -> tuple[MotorAtHand, ...]:
-    """Motors at hand. Raises: SceneError: every error of their file."""
-    file = scene.design.motor_file
-    if file is None:
-        return scene.design.motors
-    folder, declared = scene.checked.folder if scene.checked else None, keys_of(MotorAtHand)
-    rows = read_choices(
-        (folder or Path()) / file,
-        table="design.motors",
-        keys={name: declared[name] for name in declared if name != NAME},
-    )
-    names = rows.names or tuple(f"motor {number}" for number in range(1, len(rows.rows) + 1))
-    motors = [
-        {NAME: name, **{key: value for key, value in row.items() if value is not None}}
-        for name, row in zip(names, rows.rows, strict=True)
-    ]
-    changes = {"design.motors": motors, "design.motor_file": None}
-    return eccentric_scene(scene.with_values(changes)).design.motors
-
-
 def _candidate(
     scene: EccentricScene, motor: MotorAtHand | None, radius: float, needed: float
 ) -> MassCandidate:
     """Masses, gear and gains for a motor at a guide radius."""
     point: dict[str, Any] = {"masses.guide_radius": radius}
     if motor is not None:
-        back_emf = motor.back_emf_constant
-        point |= {
-            "motor.torque_constant": motor.torque_constant,
-            "motor.back_emf_constant": motor.torque_constant if back_emf is None else back_emf,
-            "motor.resistance": motor.resistance,
-            "motor.motor_inertia": motor.inertia,
-            "motor.maximum_voltage": motor.maximum_voltage,
-        }
+        keys = ("torque_constant", "resistance", "maximum_voltage")
+        back_emf = motor.torque_constant if motor.back_emf_constant is None else motor.back_emf_constant
+        point |= {f"motor.{key}": getattr(motor, key) for key in keys}
+        point |= {"motor.back_emf_constant": back_emf, "motor.motor_inertia": motor.inertia}
+
     # The masses shade each other the more the longer they are, and are longer the heavier.
-    before, mass, lightest = scene.masses, scene.masses.mass, motor.mass if motor else 0.0
+    before, mass = scene.masses, scene.masses.mass
+
+    def arc_length() -> float:
+        return float(before.arc_length * (mass / before.mass) ** (1 / 3))
+
     for _ in range(_SIZINGS):
-        length = before.arc_length * (mass / before.mass) ** (1 / 3)
-        sized = with_values_at(scene, {**point, "masses.mass": mass, "masses.arc_length": length})
-        reach = reach_of(sized)
-        if reach <= 0 or length > math.pi * radius:
+        sized = {**point, "masses.mass": mass, "masses.arc_length": arc_length()}
+        reach = reach_of(with_values_at(scene, sized))
+        if reach <= 0 or arc_length() > math.pi * radius:
             break
         mass *= needed / reach
-    mass = rounded(_DIGITS_UP * max(mass, lightest))
-    point |= {"masses.mass": mass}
-    point["masses.arc_length"] = rounded(before.arc_length * (mass / before.mass) ** (1 / 3))
+    mass = rounded(_DIGITS_UP * max(mass, motor.mass if motor else 0.0))
+    point |= {"masses.mass": mass, "masses.arc_length": rounded(arc_length())}
+
+    # The gear whose smaller ratio to the need, of stall torque or of speed without load, is largest.
     first, second, third = scene.motor.teeth
-    gears = scene.design.teeth or tuple(factor * first for factor in (1, 2, 3, 4))
-    geared = {
-        teeth: with_values_at(scene, {**point, "motor.teeth": (teeth, second, third)}) for teeth in gears
-    }
-    ratios = {teeth: _drive_over_need(each) for teeth, each in geared.items()}
-    teeth = max(ratios, key=lambda each: ratios[each])
-    point["motor.teeth"] = [teeth, second, third]
-    against = None
-    most, drive_over_need = scene.design.mass, ratios[teeth]
+    drive_over_need, geared = -math.inf, scene
+    for teeth in scene.design.teeth or tuple(factor * first for factor in (1, 2, 3, 4)):
+        other = with_values_at(scene, {**point, "motor.teeth": (teeth, second, third)})
+        plant, stall = PlantParameters.of(other), stall_ratio(other)
+        fastest = max(scene.friction_filter.drive_speed, _FASTEST_MOVE_RAD_S)
+        back_emf = plant.back_emf_constant * plant.gear_ratio * fastest
+        free = plant.maximum_voltage / back_emf if back_emf else math.inf
+        ratio = min(math.inf if stall is None else stall, free)
+        if ratio > drive_over_need:
+            drive_over_need, geared = ratio, other
+    point["motor.teeth"] = list(geared.motor.teeth)
+
+    against, most = None, scene.design.mass
+    values: dict[str, Value] = {"mass": mass, "most": most, "radius": radius}
+    if most is not None and mass > most:
+        against = Finding(code="mass_too_heavy", values=values)
+    elif drive_over_need < _MARGIN:
+        values = {"name": motor.name if motor else "of the scene", "teeth": geared.motor.teeth[0]}
+        values |= {"over": drive_over_need, "least": _MARGIN}
+        against = Finding(code="motor_too_weak", values=values)
     try:
-        if most is not None and mass > most:
-            values: dict[str, Value] = {"mass": mass, "most": most, "radius": radius}
-            against = Finding(code="mass_too_heavy", values=values)
-        elif drive_over_need < _MARGIN:
-            name = motor.name if motor else "of the scene"
-            values = {"name": name, "over": drive_over_need, "least": _MARGIN, "teeth": teeth}
-            against = Finding(code="motor_too_weak", values=values)
-        residual = required_residual(geared[teeth])
+        residual = required_residual(geared)
         if residual is not None:
             # Left within the limit at the balancing speed, the vibration is within the residual at the last.
-            last = float(scene.rotor.profile[1][-1])
-            grown = whirl_per_imbalance(geared[teeth], last) / whirl_per_imbalance(
-                geared[teeth], starting_speed(scene)
-            )
+            start, last = starting_speed(scene), float(scene.rotor.profile[1][-1])
+            grown = whirl_per_imbalance(geared, last) / whirl_per_imbalance(geared, start)
             point["supervisor.limit"] = rounded(residual / max(grown, 1.0) / _DIGITS_UP)
-        point |= sized_gains(geared[teeth])
+        point |= sized_gains(geared)
         scene.with_values(point)
     except SceneError as error:
         against = against or Finding(code="mass_design_refused", values={"text": str(error.faults[0])})
+    name = motor.name if motor else ""
     return MassCandidate(
-        motor=motor.name if motor else "",
-        point=point,
-        moving=2 * mass,
-        drive_over_need=drive_over_need,
-        against=against,
+        motor=name, point=point, moving=2 * mass, drive_over_need=drive_over_need, against=against
     )
-
-
-def _drive_over_need(scene: EccentricScene) -> float:
-    """Smaller of stall torque and of speed without load, each over what is needed."""
-    plant, stall = PlantParameters.of(scene), stall_ratio(scene)
-    fastest = max(scene.friction_filter.drive_speed, _FASTEST_MOVE_RAD_S)
-    back_emf = plant.back_emf_constant * plant.gear_ratio
-    free = plant.maximum_voltage / (back_emf * fastest) if back_emf else math.inf
-    return min(math.inf if stall is None else stall, free)
 
 
 def _looked_at(scene: EccentricScene, point: Point) -> Judgement | None:

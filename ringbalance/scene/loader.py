@@ -56,7 +56,8 @@ def read_scene(path: str | PathLike[str]) -> tuple[AnyScene, str]:
     file = name if name.isprintable() else toml_text(name)
     content, problem = read_bounded(location, what="scene file", most=_LARGEST_FILE_BYTES)
     if problem:
-        hint = did_you_mean(name, bundled)
+        other = f"{location.name}.toml"
+        hint = f' (as "{other}")' if location.name in bundled else did_you_mean(name, bundled)
         raise SceneError.of_file(file, problem, f"a TOML file, or a scene that comes with the program{hint}")
     scene = scene_from(content=content, file=file, folder=location.parent)
     if scene.remark:

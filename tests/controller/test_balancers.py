@@ -168,6 +168,10 @@ def test_the_third_balancer_is_compared(balls: BallScene) -> None:
     assert result["balancer"] == ["ball", "liquid_ring"]
     assert result["fraction"][0]["value"] > 0.5
     assert result["rotor"]["unbalance_kg_m"] == pytest.approx([80e-6, 0.0])
+    # Balls take no samples.
+    assert result["sampling_time_s"] == [None, ring.sampling_time()]
+    (sampled,) = [each for each in result["quantities"] if each["key"] == "1.sampling_time"]
+    assert (sampled["value"], sampled["status"]) == (None, "not_sampled")
     with pytest.raises(rb.SceneError, match="below the critical speed"):
         compare(ring, balancer_of(balls), rotor="first")
 

@@ -172,12 +172,16 @@ def test_both_are_run_on_the_same_drawn_rotor_whichever_is_first(
     """Speed, influence coefficient and unbalance of each device; what else is drawn is each one's own."""
     ring, masses = under_paper_law(paper_scene), balancer_of(small)
     both: dict[int, CommonRotor] = {}
+    scenes: dict[str, SceneFile] = {}
     for first, second in ((ring, masses), (masses, ring)):
         common = joined_rotor(first.rotor(), second.rotor())
         rotors = rotors_of(common, first.rotor, second.rotor)
         placed = [each.on_rotor(common, rotors) for each in (first, second)]
+        # To the last digit, so that searches and runs are the same too.
+        assert all(each.scene == scenes.setdefault(each.scene.balancer, each.scene) for each in placed)
         for number in (3, 70):
             rotor = both.setdefault(number, rotors(number))
+            assert rotors(number) == rotor
             for other in (rotors(number), *(each.rotor(number) for each in placed)):
                 assert other.speed == pytest.approx(rotor.speed)
                 assert other.influence == pytest.approx(rotor.influence, rel=1e-4)

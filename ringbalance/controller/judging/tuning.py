@@ -112,7 +112,7 @@ class Tuning(Result):
     @property
     def status(self) -> str:
         """The first two findings as text."""
-        return " ".join(finding.text for finding in islice(self._findings(), 2))
+        return "; ".join(finding.text for finding in islice(self._findings(), 2))
 
     def to_dict(self) -> dict[str, Any]:
         """The result as a JSON document, SI."""

@@ -183,7 +183,7 @@ def test_the_verdict_is_that_of_the_best_part_on_sale_and_not_that_of_an_ideal_o
     result = replace(paper, choices=(missed,))
     assert (paper.succeeded, result.succeeded) == (True, False)
     assert result.status.startswith("not met with any valve on sale that was tried (1): with the best, ")
-    assert " and an ideal valve 100" in result.status
+    assert "required; met: with the recommended settings and an ideal valve 100" in result.status
     document = result.to_dict()
     assert document["verdict"] == document["own"]["verdict"] == "not met"
     assert document["ideal_part"]["verdict"] == MET

@@ -79,7 +79,7 @@ def _build_app() -> App:
         help_epilogue=(
             "ringbalance COMMAND --help has the options, an example and the exit codes of a command; "
             "ringbalance --install-completion lets the shell complete names of commands and options. "
-            "Begin with: ringbalance report my_disc.toml (README.md has a scene to copy, docs/ all pages)."
+            "Begin with: ringbalance report liquid_ring_paper; an unknown name lists the bundled scenes."
         ),
         version=ringbalance.__version__,
         # Markdown would load a parser and a highlighter, half the time of `--help`.

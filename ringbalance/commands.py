@@ -68,7 +68,7 @@ class ShellCommand(NamedTuple):
             f"Example: {example}\n\n"
             f"Exit codes: 0 done; {failed}2 bad input, or output that cannot be written; 130 interrupted; "
             "141 the reader of standard output went away.\n\n"
-            f"All options, files and JSON keys: docs/commands.md"
+            'All files and JSON keys: page "Commands, exit codes and JSON" of the documentation'
         )
 
 
@@ -82,7 +82,9 @@ _TEXT: Final = ShellOption(str | None)
 _ARGUMENT: Final = ShellOption(Path, REQUIRED, kind=Parameter.POSITIONAL_OR_KEYWORD)
 _EFFORT: Final = Literal["light", "heavy"]
 _OPTIONS: Final = {
-    "scene": _ARGUMENT._replace(text="the scene file."),
+    "scene": _ARGUMENT._replace(
+        text="the scene file, or a bundled scene's name; an unknown name lists them."
+    ),
     **dict.fromkeys(("first", "second"), _ARGUMENT),
     "case_ids": ShellOption(str, (), kind=Parameter.VAR_POSITIONAL),
     "json": _FLAG._replace(text="print one JSON document instead of tables."),
@@ -91,14 +93,17 @@ _OPTIONS: Final = {
     "csv": ShellOption(Path | None, ending=".csv"),
     "plot": ShellOption(Path | None, ending=".svg"),
     "valves": _PATH._replace(
-        text="a CSV file of valves at hand (docs/scene-file.md), in place of those otherwise tried."
+        text="a CSV file of valves at hand (columns name, valve_lag and a flow as in [gas]), in place of "
+        "those otherwise tried."
     ),
     "level": ShellOption(_EFFORT, "light"),
     "workers": ShellOption(
         int | None, None, "processes; default one for each processor.", limits=_AT_LEAST_1
     ),
     "tolerance": _TEXT._replace(
-        text='in place of the scene\'s, such as "0.5 %" or 0.005; 0: the finest of all that is expensive.'
+        text='in place of the scene\'s, such as "0.5 %" or 0.005; 0: the finest of all that is expensive.',
+        # A negative number with a unit is refused by its reader, not taken for an option.
+        parsing={"allow_leading_hyphen": True},
     ),
     "law": ShellOption(
         str,
@@ -267,7 +272,7 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
 
         Args:
             scene: the scene file of the disc as it was designed.
-            data: files of measurements (docs/fit.md), one kind in each.
+            data: files of measurements, one kind in each; --template writes an empty one.
             parameters: names separated by commas, such as "bore,extra_loss"; default those that the kinds of
                 data inform most.
             loss: "soft_l1" gives outliers less weight, and names their rows.
@@ -291,13 +296,15 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
 
         Args:
             case_ids: ids of cases; default all.
-            cases: a folder with cases of your own (docs/verification-cases.md), which join the program's.
+            cases: a folder with cases of your own (page "A verification case of your own"), which join the
+                program's.
             scene: scene file; default the liquid-ring paper's disc.
             list_: only list the cases.
             mutations: also run each case with its deliberate errors, which must change its verdict.
             level: "heavy" runs the cases that take long too.
             workers: processes to spread the cases over.
-            data: a file of measurements (docs/measurements.md), judged instead of the cases; any number.
+            data: a file of measurements (page "Files of measurements"), judged instead of the cases; any
+                number.
             json: print one JSON document instead of a table.
         """,
         _options(

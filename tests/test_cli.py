@@ -21,9 +21,11 @@ from ringbalance import __version__, cli, streams
 from ringbalance.commands import COMMANDS, ShellCommand
 from ringbalance.running import TARGETS
 from ringbalance.scene import Fault, SceneError, bundled_scene
+from ringbalance.scene.narrowing import LIQUID_RING_ALONE
 
 ROOT = Path(__file__).parents[1]
 PAPER = str(bundled_scene("liquid_ring_paper"))
+DRIVEN = str(bundled_scene("driven_masses_small"))
 LAUNCH = [sys.executable, "-c", "import sys; from ringbalance.cli import main; sys.exit(main())"]
 
 # A shell's background job is started with interrupts ignored, and its children inherit that.
@@ -320,7 +322,9 @@ def test_help_has_an_example_and_the_exit_codes_of_its_command(run_in_process: R
     shown = " ".join(run_in_process(name, "--help").stdout.split())
     assert f"Example: ringbalance {name}" in shown
     assert ("0 done; 1 " in shown) == bool(COMMANDS[name].failure)
-    assert "docs/commands.md" in shown
+    assert "Commands, exit codes and JSON" in shown
+    # An installed program has no pages beside it.
+    assert "docs/" not in shown
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -353,3 +357,32 @@ def test_the_shell_s_completion_is_written(
     assert run_in_process("--install-completion").returncode == 0
     (script,) = tmp_path.rglob("completions/ringbalance")
     assert {"calibrate", "--tolerance"} <= set(script.read_text().replace("'", " ").split())
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("simulate", PAPER, "--tolerance", "-5 %"), "it must be at least 0 and below 1"),
+        (("simulate", PAPER, "--law", "noise"), "noise: this is not UTF-8 text; allowed: a file written by"),
+        (("sweep", PAPER, "--plan", "noise", "--out", "o"), "noise: this is not UTF-8 text; allowed: a TOML"),
+        (("sweep", PAPER, "--vary", "tube.bore=1mm:2mm:0", "--out", "o"), "must be whole and above 0"),
+        (("simulate", "absent"), "a scene that comes with the program: driven_masses_small, "),
+        (("plot", DRIVEN, "--out", "o"), f"all commands but {LIQUID_RING_ALONE} take any"),
+    ],
+)
+def test_one_sentence_says_what_is_allowed(
+    words: tuple[str, ...],
+    sentence: str,
+    run_in_process: Run,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (tmp_path / "noise").write_bytes(bytes(range(128, 256)))
+    monkeypatch.chdir(tmp_path)
+    assert_bad_input(run_in_process(*words), sentence)
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/commands.md"])
+def test_pages_name_the_commands_of_a_liquid_ring_as_the_error_does(page: str) -> None:
+    listed = re.findall("All commands but (.*?) take", (ROOT / page).read_text(encoding="utf-8"))
+    assert [each.replace("`", "") for each in listed] == [LIQUID_RING_ALONE]

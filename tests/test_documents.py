@@ -213,6 +213,13 @@ def test_keys_of_verify(printed: Any) -> None:
     compare("`verify --json`", [printed("verify", *cases, "--mutations")])
 
 
+def test_keys_of_verify_with_data(printed: Any) -> None:
+    data = PAGE.parents[1] / "verification" / "validation" / "data" / "senecal_1951.csv"
+    answer = printed("verify", "--data", data)
+    # Series by their own names.
+    compare("`verify --data --json`", [answer | {"series": list(answer["series"].values())}])
+
+
 @pytest.mark.heavy
 def test_keys_of_extremes() -> None:
     scene = liquid_ring_scene(rb.load_scene(PAPER))

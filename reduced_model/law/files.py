@@ -21,6 +21,7 @@ from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.regime import TubePath
 from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.platform.files import NOT_TEXT
 
 _LAWS: Final = (CalibratedLaw, PaperLaw)
 _RECORDS: Final[Mapping[str, type]] = MappingProxyType(
@@ -156,6 +157,8 @@ def load_law(path: Path | str) -> CompleteLaw:
         content = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         reader.fault("", "", f"the file cannot be read: {error.strerror or error}", wanted)
+    except UnicodeDecodeError:
+        reader.fault("", "", NOT_TEXT, wanted)
     except (ValueError, RecursionError) as error:
         reader.fault("", "", f"the file is not JSON: {error}", wanted)
     else:

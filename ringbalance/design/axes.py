@@ -27,6 +27,7 @@ from ringbalance.scene.keys.fields import ValueReader
 from ringbalance.scene.keys.schema import ORIGIN, Schema
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.platform.files import NOT_TEXT
 from ringbalance.scene.registry import registered
 from ringbalance.scene.toml import read_toml
 from ringbalance.scene.units import DIMENSIONS, FieldError
@@ -218,6 +219,8 @@ def plan_of_file(scene: SceneFile, file: Path) -> Plan:
         raise SceneError.of_file(str(file), "there is no such file", "a TOML file with vary and sample")
     try:
         content = read_toml(file.read_text(encoding="utf-8"))
+    except UnicodeDecodeError as error:
+        raise SceneError.of_file(str(file), NOT_TEXT, "a TOML file with vary and sample") from error
     except (OSError, ValueError, RecursionError) as error:
         raise SceneError.of_file(str(file), f"the plan cannot be read: {error}") from error
     texts, sample = content.pop("vary", None), content.pop("sample", "")
@@ -319,7 +322,8 @@ def _values(scene: SceneFile, path: str, values: Any) -> tuple[str, Range | list
     log = bool(more) and more[-1] == "log"
     counts = more[:-1] if log else more
     if len(counts) > 1 or not all(each.isdecimal() and int(each) > 0 for each in counts):
-        raise _fault(f"{path}={values[0]}", "this is no range", "LOW:HIGH:COUNT or LOW:HIGH:COUNT:log")
+        problem = "the number of values must be whole and above 0" if len(counts) == 1 else "this is no range"
+        raise _fault(f"{path}={values[0]}", problem, "LOW:HIGH:COUNT or LOW:HIGH:COUNT:log")
     ends = [_read(path, end, reader) for end in (low, high)]
     if not all(isinstance(end, float) for end in ends) or (log and min(ends) <= 0):
         raise _fault(f"{path}={values[0]}", "this key has no such range", "a list A,B,C")

@@ -34,6 +34,8 @@ _STYLES: Final = {"info": "green", "warning": "yellow", "error": "red"}
 _UNBROKEN_NAME_CHARACTERS: Final = 28
 _MAIN_QUANTITIES: Final = 3
 _NOTEBOOK_QUANTITIES: Final = 10
+_LIMITED: Final = {"ok": "", "out_of_range": " (beyond the validity of its models, as a warning says)"}
+"""Limit of a number in words, by its status, where the status does not say it."""
 _COLUMNS: Final = ("name", "symbol", "value", "lower", "upper", "unit", "origin", "status")
 _EXTRA: Final = "this needs the package {0}: pip install {0}, or ringbalance[sweep-tables] with all of them"
 _NUMBER: Final = re.compile(r"(?:<[^>]*>)*[(+−-]?\d")
@@ -179,7 +181,7 @@ class Rows:
         """
         facts = list(self.facts)
         for each in self.quantities[: self.listed]:
-            limited = "" if each.status == "ok" else f" ({each.status.replace('_', ' ')})"
+            limited = _LIMITED.get(each.status, f" ({each.status.replace('_', ' ')})")
             facts.append((each.name, plain(each.text) + limited))
         numbers = _two_columns(facts)
         tables = iter([_terminal_table(table) for table in self.tables if table.rows])

@@ -16,12 +16,13 @@ from typing import Any, Final
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.faults import Fault, SceneError
-from ringbalance.scene.keys.declaration import Entries, Key
+from ringbalance.scene.keys.declaration import Entries, Key, descriptions_of
 from ringbalance.scene.keys.fields import ValueReader
 from ringbalance.scene.keys.reading import SceneInput
 from ringbalance.scene.keys.schema import ORIGIN, Schema
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.loader import CHANGED, nameless_scene, scene_of
+from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.narrowing import AnyScene, Kind, scene_as
 from ringbalance.scene.origins import KEY_OF_FIELD, CheckedValues, Origin, SceneFile, raw_value_at
 from ringbalance.scene.toml import toml_bytes, toml_text
@@ -170,12 +171,19 @@ def document_of(scene: SceneFile) -> Mapping[str, Any]:
 def file_text(scene: SceneFile, *, to: Path) -> bytes:
     """Bytes of a scene file for a folder; the path of a mesh becomes relative to that folder.
 
+    Settings that only another control algorithm reads are left out.
     Raises: SceneError: a scene made without the checks of a file.
     """
     checked = _known(scene)
     document = deepcopy(dict(checked.document))
     if mesh := document.get("disc", {}).get("mesh"):
         document["disc"]["mesh"] = Path(os.path.relpath(checked.folder / mesh, to)).as_posix()
+    if isinstance(settings := checked.parts.get("controller"), ControllerSettings):
+        content = document.get("controller", {})
+        for key, shown in descriptions_of(ControllerSettings).items():
+            if shown.only_for not in ("", settings.kind):
+                content.pop(key, None)
+                content.get(ORIGIN, {}).pop(key, None)
     return toml_bytes(document)
 
 

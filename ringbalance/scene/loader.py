@@ -58,7 +58,10 @@ def read_scene(path: str | PathLike[str]) -> tuple[AnyScene, str]:
     if problem:
         other = f"{location.name}.toml"
         hint = f' (as "{other}")' if location.name in bundled else did_you_mean(name, bundled)
-        raise SceneError.of_file(file, problem, f"a TOML file, or a scene that comes with the program{hint}")
+        names = ", ".join(bundled)
+        raise SceneError.of_file(
+            file, problem, f"a TOML file, or a scene that comes with the program: {names}{hint}"
+        )
     scene = scene_from(content=content, file=file, folder=location.parent)
     if scene.remark:
         LOG.warning("%s: %s", file, scene.remark)

@@ -243,15 +243,17 @@ class ControllerSettings:
         float,
         quantity("gain", POSITIVE),
         standard("0.08 s/um", "Kc, valve-open time per vibration amplitude"),
-        Shown("proportional gain Kc", "s/um"),
+        Shown("proportional gain Kc", "s/um", only_for="target_vector"),
     ]
     integral_time: Annotated[
         PositiveTime | None,
         unused("no integral part", "Ti"),
-        Shown("integral time Ti", "min", absent="no integral part"),
+        Shown("integral time Ti", "min", absent="no integral part", only_for="target_vector"),
     ]
     derivative_time: Annotated[
-        Time, standard("0 s", "Td; zero for no derivative part"), Shown("derivative time Td", "min")
+        Time,
+        standard("0 s", "Td; zero for no derivative part"),
+        Shown("derivative time Td", "min", only_for="target_vector"),
     ]
     minimum_gas_time: Annotated[
         Time, standard("1 ms", "a shorter command is not executed"), Shown("shortest valve-open time", "ms")

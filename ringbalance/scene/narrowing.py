@@ -15,7 +15,8 @@ Kind = TypeVar("Kind", bound=SceneFile)
 
 
 _REASON: Final = {"liquid_ring": ": its law is of a liquid in chambers"}
-_ANY: Final = "report, simulate, tune, compare, sweep, fit and export"
+LIQUID_RING_ALONE: Final = "calibrate, extremes, plot, trade and verify"
+"""Commands that need a scene of a liquid ring."""
 
 
 def scene_as(kind: type[Kind], scene: SceneFile) -> Kind:
@@ -27,7 +28,7 @@ def scene_as(kind: type[Kind], scene: SceneFile) -> Kind:
         key="balancer",
         value=f'"{scene.balancer}"',
         problem=f"this needs a scene of the balancer {kind.balancer}{_REASON.get(kind.balancer, '')}",
-        allowed=f'balancer = "{kind.balancer}"; {_ANY} take any',
+        allowed=f'balancer = "{kind.balancer}"; all commands but {LIQUID_RING_ALONE} take any',
     )
     raise SceneError([fault])
 

@@ -111,7 +111,7 @@ def test_the_answer_is_kept_for_the_values_of_the_scene(
     )
     weak = replace(design, effects=(few, many))
     (finding,) = (each for each in weak.rows().findings if each.code == "design_pressure")
-    assert "with a gas pressure of 0.3 MPa, all else as it is, 36.7 % of 256 devices" in finding.text
+    assert "not at 0.3 MPa: there, all else as it is, 36.7 % of 256 devices" in finding.text
     # The lag of a valve on sale is marked in the saved scene, that of a stated one is not.
     assert design.assumed == ()
     on_sale = beside_unchanged(liquid_ring_scene(scene.with_values({"design.valves": None})), design)

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
@@ -63,6 +64,13 @@ def test_the_terminal_shows_a_lopsided_interval_and_the_status() -> None:
     (row,) = (line for line in lines if "pressure to empty" in line)
     assert "(0.418 -0.003/+0.012) MPa (gas drawn)" in row
     assert any(line.split() == ["siphon", "-1.5"] for line in lines)
+
+
+def test_a_number_out_of_range_says_of_what() -> None:
+    beyond = Rows(title="", quantities=(replace(STALL, status="out_of_range"),))
+    console = Console(width=120, file=io.StringIO(), record=True)
+    console.print(beyond.view())
+    assert "MPa (beyond the validity of its models, as a warning says)" in console.export_text()
 
 
 def test_a_notebook_shows_the_same_rows() -> None:

@@ -226,3 +226,17 @@ def test_what_is_taken_away_is_gone(whole: bool) -> None:
     assert without.design.pressure is None
     assert (without.requirement.settling_time is None) is not whole
     assert (without.design.axial_width is None) is whole
+
+
+def test_a_file_has_no_settings_that_only_another_algorithm_reads() -> None:
+    settings = {
+        kind: tomllib.loads(
+            file_text(bundled(PAPER).with_values({"controller.kind": kind}), to=Path()).decode()
+        )["controller"]
+        for kind in ("target_vector", "law_based", "trial")
+    }
+    gains = {"proportional", "integral_time", "derivative_time"}
+    trial = {"sequence", "first_trial", "long_step", "short_step", "fine_below"}
+    for kind, read in (("target_vector", gains), ("law_based", set()), ("trial", trial)):
+        assert settings[kind].keys() & (gains | trial) == read
+        assert settings[kind]["origin"].keys() <= settings[kind].keys()

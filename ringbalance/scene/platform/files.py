@@ -27,6 +27,7 @@ try:
 except ImportError:  # Windows has no such locks.
     fcntl = None  # type: ignore[assignment]
 
+NOT_TEXT: Final = "this is not UTF-8 text"
 _ELSEWHERE: Final = "move it away or choose another place"
 _PREFIX: Final = ".ringbalance-"
 _NAME: Final = re.compile(re.escape(_PREFIX) + "[0-9a-f]{16}")

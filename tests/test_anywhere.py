@@ -60,7 +60,7 @@ def test_a_folder_of_a_scenes_name_is_no_scene_and_the_scene_is_named(
     """As after `--out liquid_ring_paper`; what the sentence names is loaded beside the folder."""
     monkeypatch.chdir(tmp_path)
     Path(NAME).mkdir()
-    words = rf'this is a folder, .* comes with the program \(as "{NAME}.toml"\)'
+    words = rf'this is a folder, .* comes with the program: .* \(as "{NAME}.toml"\)'
     with pytest.raises(rb.SceneError, match=words):
         rb.load_scene(typed)
     assert rb.load_scene(f"{NAME}.toml").source == f"{NAME}.toml"

@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from textwrap import fill
 from typing import Any, Final, Literal, cast
 
 import matplotlib
@@ -375,7 +376,7 @@ def draw(
     """
     settings: Any = dict(_RC)
     with matplotlib.rc_context(settings):
-        width = width or (WIDE_IN if wide else NARROW_IN)
+        fits, width = width is not None, width or (WIDE_IN if wide else NARROW_IN)
         figure = Figure(figsize=(width, height))
         # Margins in inches, equal in all figures, so that neighbours align.
         sizes = 1 - (_LEFT_IN + _RIGHT_IN) / width, 1 - (_BOTTOM_IN + _TOP_IN) / height
@@ -389,6 +390,8 @@ def draw(
         _in_unit(axes.yaxis, axes.get_ylim(), y)
         if columns:
             _legend_above(axes, columns=columns)
+        if fits:
+            _fit(axes)
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", dpi=_EMBEDDED_DPI, metadata={"Date": None, "Creator": None})
         frames = tuple(_frame(each) for each in figure.axes if each.axison and each.get_xscale() == "linear")
@@ -468,10 +471,21 @@ def _legend_above(axes: Axes, *, columns: int) -> None:
         if fitting == 1 or not labels or legend.get_window_extent().width <= figure.bbox.width:
             break
         legend.remove()
-    rows = -(-len(labels) // fitting)
+    rows = -(-len(labels) // fitting) + sum(label.count("\n") for label in labels)
     top = _TOP_IN + _LEGEND_ROW_IN * rows + (_TOP_AXIS_IN if axes.child_axes else 0.0)
     box, height = axes.get_position(), figure.get_figheight()
     axes.set_position((box.x0, box.y0, box.width, 1 - (_BOTTOM_IN + top) / height))
+
+
+def _fit(axes: Axes) -> None:
+    """Break a label of the y-axis that is longer than the axis, and narrow the axes until all labels fit."""
+    figure, label = figure_of(axes), axes.yaxis.label
+    tall, text = label.get_window_extent().height / axes.bbox.height, label.get_text()
+    if tall > 1:
+        label.set_text(fill(text, int(len(text) / tall)))
+    drawn, box, across = figure.get_tightbbox(), axes.get_position(), figure.get_figwidth()
+    left, right = max(-drawn.x0 / across, 0.0), max(drawn.x1 / across - 1.0, 0.0)
+    axes.set_position((box.x0 + left, box.y0, box.width - left - right, box.height))
 
 
 def sheet(drawings: Sequence[Drawing]) -> str:

@@ -56,6 +56,7 @@ _REASONS: Final = MappingProxyType({BLOCKED: "no flow", REFUSED: "refused scene"
 """Reasons why a point has no value, by its status."""
 _TOO_FEW: Final = "too few devices settle"
 _MAX_NOTE_CHARACTERS: Final = 50
+_MAX_COLUMN_NOTE_CHARACTERS: Final = 40
 _MAX_BAR_LABEL_CHARACTERS: Final = 26
 _CONTOURS: Final = 6
 """Largest number of steps between contour lines."""
@@ -122,7 +123,8 @@ def _page(view: View, drawings: list[Drawing]) -> str:
         values = np.array(fields[name].values, dtype=object)[view.shown] if name in fields else ()
         if any(value not in (None, "") for value in values):
             texts = [_REASONS.get(value, value) for value in values] if name == "verdict" else [*values]
-            columns.append(ReadingColumn(name=words, values=texts, unit=fields[name].unit))
+            unit = "" if any(isinstance(text, str) for text in texts) else fields[name].unit
+            columns.append(ReadingColumn(name=words, values=texts, unit=unit))
     figures = []
     for drawing in drawings:
         (column,) = [name for name in COLUMNS if drawing.name.startswith(_stem(name))]
@@ -202,7 +204,7 @@ def _drawing(view: View, name: str, unit: str, values: list[Any], width: float |
     axes: list[AxisLabel] = [(axis_name(path), unit_of_path(sweep.scene, path)) for path in view.paths]
     feasible = np.array(sweep.feasible)[view.shown]
     best = np.flatnonzero(view.shown) == sweep.best_or_nearest
-    over = [*keys, shown][:2]
+    over, page = [*keys, shown][:2], width is None
     statuses = {
         row["status"]
         for row, finite in zip(np.array(sweep.static)[view.shown], np.isfinite(shown), strict=True)
@@ -213,7 +215,8 @@ def _drawing(view: View, name: str, unit: str, values: list[Any], width: float |
 
     def paint(panel: Axes) -> None:
         if view.note:
-            panel.plot([], [], linestyle="", label=view.note)
+            note = view.note if page else fill(view.note, _MAX_COLUMN_NOTE_CHARACTERS)
+            panel.plot([], [], linestyle="", label=note)
         if len(keys) == 1:
             order = np.argsort(over[0], kind="stable")
             panel.plot(over[0][order], over[1][order], color=MUTED, linewidth=1)
@@ -225,7 +228,7 @@ def _drawing(view: View, name: str, unit: str, values: list[Any], width: float |
             panel.scatter(*(each[best] for each in over), label=label, **_BEST)
 
     y = axes[1] if len(axes) > 1 else (COLUMNS[name], unit)
-    stem, page = _stem(name), width is None
+    stem = _stem(name)
     size: dict[str, Any] = {"height": 3.6 if page else 2.9, "columns": 4 if page else 2, "wide": page}
     return draw(stem if page else f"{stem}-85mm", paint, x=axes[0], y=y, width=width, **size)
 

@@ -12,7 +12,7 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement
 from ringbalance.controller.algorithms.built_in import BuiltIn, command_of, show
 from ringbalance.controller.algorithms.law_based import controller_of
-from ringbalance.controller.document import command_document, simulation_rows
+from ringbalance.controller.document import command_document, simulation_history, simulation_rows
 from ringbalance.controller.liquid_ring.loop_factor import loop_factor
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop_plan import LoopPlan, Trace
@@ -124,7 +124,9 @@ def simulate(
         samples=_samples(trace, scene.disc.chambers, outside),
         terms_modelled=terms_modelled(used),
         models_used=used,
-        presentation=Presentation(document=command_document, rows=simulation_rows),
+        presentation=Presentation(
+            document=command_document, rows=simulation_rows, history=simulation_history
+        ),
         again=partial(simulate, model=model),
     )
     return replace(run, findings=run_findings(run))

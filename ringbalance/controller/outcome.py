@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from ringbalance.controller.balancer import WATCH_TIME_S
-from ringbalance.controller.liquid_ring.loop_factor import default_gain
+from ringbalance.controller.liquid_ring.loop_factor import default_gain, small_margin
 from ringbalance.controller.liquid_ring.plant import (
     LEAST_PRESSURE_PA,
     NEARLY_EMPTY,
@@ -20,7 +20,7 @@ from ringbalance.reduced_model.residual_liquid import Holding
 from ringbalance.results.rows import Finding, Value, sentences
 
 _BY_SETTINGS: Final = {
-    *(Outcome.HOVERING, Outcome.UNSTABLE, Outcome.TIME_LIMIT),
+    *(Outcome.HOVERING, Outcome.UNSTABLE, Outcome.TIME_LIMIT, Outcome.LIMIT_CYCLE),
     *(Outcome.DIVERGING, Outcome.GAS_TIME_TOO_SHORT),
 }
 """Ends that other settings may change."""
@@ -53,7 +53,7 @@ def run_findings(run: Simulation) -> tuple[Finding, ...]:
         findings.append(Finding(code="injections_shortened", values=values))
     findings += assumed_rotor(scene)
     if run.loop.fixed:
-        findings += default_gain(scene)
+        findings += (*default_gain(scene), *small_margin(scene, run.loop.margins))
     return tuple(findings)
 
 
@@ -99,6 +99,8 @@ def _numbers(run: Simulation) -> dict[str, Value]:
     }
     if run.longest is not None:
         numbers |= {"duration": run.longest.duration, "chamber": run.longest.chamber}
+    if run.limit_cycle:
+        numbers["corrections"], numbers["cycle_amplitude"] = run.limit_cycle
     if run.outcome is Outcome.STALLED:
         numbers |= _pressures(run)
     if run.outcome is Outcome.CAPACITY_EXCEEDED:
@@ -119,6 +121,9 @@ def _causes(run: Simulation) -> Iterator[Finding]:
             yield Finding(code="noise_sustained", values={"deviation": deviation})
     if outcome in {Outcome.TIME_LIMIT, Outcome.GAS_TIME_TOO_SHORT}:
         yield from _dead_time(run)
+    lag_is_off = any(small_margin(scene, loop.margins))
+    if outcome is Outcome.LIMIT_CYCLE and run.controller == "target_vector" and not lag_is_off:
+        yield Finding(code="cycle_ends")
     if outcome in {Outcome.DIVERGING, Outcome.UNSTABLE}:
         # A residual grows: too much of it is removed at once, or in another direction.
         if loop.value is None or not loop.unstable or loop.limit < _TURNED:

@@ -39,6 +39,10 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
 _LITRE = 1e-3
+_CYCLE_THIRD: Final = 3
+"""Least third of a run's corrections from which a limit cycle is known: one period and a half."""
+_FALLS: Final = 0.9
+"""Ratio of readings from one third to the next below which they fall."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,6 +166,7 @@ class Outcome(StrEnum):
     HOLD_INCOMPLETE = "hold_incomplete"
     UNSTABLE = "unstable"
     TIME_LIMIT = "time_limit"
+    LIMIT_CYCLE = "limit_cycle"
     STALLED = "stalled"
     CAPACITY_EXCEEDED = "capacity_exceeded"
     CHAMBER_EMPTY = "chamber_empty"
@@ -332,7 +337,8 @@ class Simulation(PresentedResult):
         if self.unreachable_amplitude > limit:
             return Outcome.STALLED
         if state["lost"] or min(state["since"], state["held_since"]) < math.inf:
-            return Outcome.HOVERING if state["lost"] else Outcome.HOLD_INCOMPLETE
+            incomplete = Outcome.LIMIT_CYCLE if self.limit_cycle else Outcome.HOLD_INCOMPLETE
+            return Outcome.HOVERING if state["lost"] else incomplete
         if self.refused and cause == IDLE:
             return Outcome.CHAMBER_EMPTY
         if self.longest is not None and not self.longest.moved:
@@ -357,10 +363,33 @@ class Simulation(PresentedResult):
             return Outcome.DRIFTING
         if NOISE_DEVIATIONS * self.scene.sensor.amplitude_noise > self.limit:
             return Outcome.NOISE
+        if self.limit_cycle:
+            return Outcome.LIMIT_CYCLE
         last = self.samples[-1].command
         if not last.resting and not last.valves and last.reason == BELOW_MINIMUM:
             return Outcome.GAS_TIME_TOO_SHORT
         return Outcome.TIME_LIMIT
+
+    @cached_property
+    def limit_cycle(self) -> tuple[int, float] | None:
+        """Corrections of a limit cycle and the largest reading that they meet, m; None: no limit cycle.
+
+        Corrections continue to the time limit, the readings that their last third meets have not fallen, and
+        of the liquid that it and the third before move, more than half is moved back.
+        """
+        times = [sample.time for sample in self.samples if sample.command.valves]
+        third = len(times) // 3
+        if third < _CYCLE_THIRD:
+            return None
+        last = times[-2 * third :]
+        if times[-1] + 2.0 * np.diff(last).max() < self.scene.run.time_limit:
+            return None
+        met = np.interp(last, self.time, self.reading)
+        before, after = met[:third], met[third:]
+        falls = min(after.max() / before.max(), after.mean() / before.mean()) < _FALLS
+        moves = np.diff([np.interp(last, self.time, fills) for fills in self.fill_ratio.values()])
+        undone = np.abs(moves.sum(axis=1)).sum() < 0.5 * np.abs(moves).sum()
+        return (len(last), float(met.max())) if undone and not falls else None
 
     @property
     def verdict(self) -> RunVerdict:

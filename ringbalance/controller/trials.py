@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from ringbalance.results.result import Facts
-from ringbalance.results.rows import Quantity
+from ringbalance.results.rows import Finding, Quantity
 
 Point = Mapping[str, float]
 """Level by name of the axis."""
@@ -79,3 +79,4 @@ class Information:
     quantities: tuple[Quantity, ...] = ()
     facts: Facts = ()
     document: Mapping[str, Any] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()

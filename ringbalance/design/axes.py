@@ -3,12 +3,13 @@
 An axis is written KEY=VALUES, where VALUES is a range `LOW:HIGH:COUNT`, even steps, or `LOW:HIGH:COUNT:log`;
 a list `A,B,C`; or, for the name of a table, a CSV file whose columns are keys of that table and whose rows
 are alternatives.  Keys that vary together form one axis: `tube.bore=1mm,2mm,tube.length=0.3m,0.4m`.
-A sample needs no COUNT.
+A key that takes a list has lists: `masses.friction_arm=[60um,60um],[80um,80um]`.  A sample needs no COUNT.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -36,6 +37,8 @@ Point = Mapping[str, Any]
 """Changed values by path, as `SceneFile.with_values` takes them: SI, or text."""
 
 MAX_POINTS: Final = 1_000_000
+_COMMA: Final = re.compile(r",(?![^\[]*\])")
+"""Comma outside of a list in brackets."""
 _SAMPLES: Final = ("sobol", "latin")
 _OFTEN_WRONG_DIMENSIONS: Final = frozenset({"length", "pressure"})
 """Dimensions whose numbers are often entered in a unit other than SI, such as mm or bar."""
@@ -253,7 +256,7 @@ def plan_of_file(scene: SceneFile, file: Path) -> Plan:
 def _axis_of_text(scene: SceneFile, text: str, *, folder: Path) -> SweepAxis:
     """Read one KEY=VALUES, or several separated by commas."""
     keys: list[tuple[str, list[str]]] = []
-    for part in text.split(","):
+    for part in _COMMA.split(text):
         path, equals, value = part.partition("=")
         if equals:
             keys.append((path.strip(), [value.strip()]))
@@ -312,7 +315,7 @@ def _values(scene: SceneFile, path: str, values: Any) -> tuple[str, Range | list
     """Range or list of a key, read by the key's own reader."""
     reader = _reader(scene, path)
     if isinstance(values, str):
-        values = values.split(",")
+        values = _COMMA.split(values)
     values = values.tolist() if hasattr(values, "tolist") else values
     values = list(values) if isinstance(values, Iterable) else [values]
     _check_scale(scene, path, values, reader)
@@ -360,7 +363,7 @@ def _checked(path: str, value: Any, reader: ValueReader) -> Any:
     if not isinstance(value, str):
         return value
     read = _read(path, value, reader)
-    return read if isinstance(read, int | float) else value
+    return read if isinstance(read, int | float | tuple) else value
 
 
 def _reader(scene: SceneFile, path: str) -> ValueReader:

@@ -79,7 +79,8 @@ def read_choices(file: Path, *, table: str, keys: Mapping[str, Key]) -> Choices:
                 text = f"{cell} {unit}".strip() if cell else ""
                 try:
                     value = key.takes.read(as_toml(text, key.takes)) if text else None
-                    columns[name].append(value if isinstance(value, int | float) or not text else text)
+                    number = isinstance(value, int | float | tuple)
+                    columns[name].append(value if number or not text else text)
                 except FieldError as error:
                     faults.append(content.fault(line, head, cell, error.problem, error.allowed))
     if not columns and not faults:
@@ -124,7 +125,9 @@ def with_choices(scene: AnyScene, file: Path, kind: type, *, among: str, table: 
 
 
 def as_toml(text: str, reader: ValueReader) -> Any:
-    """Value as in a scene file: a number for a key without unit, if the text is one; else the text."""
+    """Value as in a scene file: a list in brackets, a number for a key without unit, or the text."""
+    if text.startswith("[") and text.endswith("]"):
+        return [as_toml(part.strip(" '\""), reader) for part in text[1:-1].split(",")]
     if reader.dimension is None:
         for number in (int, float):
             try:

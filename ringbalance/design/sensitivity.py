@@ -31,7 +31,8 @@ def first_order(inputs: FloatArray, result: FloatArray) -> tuple[FloatArray, Flo
     Args: `inputs`: shape (n, k). `result`: shape (n,).
     Returns: Both of shape (k,); NaN for a result that does not vary, or below `MIN_ROWS` rows.
     Source: Plischke, Reliab. Eng. Syst. Saf. 95 (2010) 354; half-widths by the jackknife that leaves half of
-        the rows out, Shao and Wu, Ann. Statist. 17 (1989) 1176; too wide for Sobol's points.
+        the rows out, Shao and Wu, Ann. Statist. 17 (1989) 1176, and no less than the contribution of noise,
+        which evenly spread points may lack: so the interval of a negative share holds zero.
     """
     rows, count = inputs.shape
     if rows < MIN_ROWS or np.ptp(result) <= 1e-12 * np.max(np.abs(result)):
@@ -42,7 +43,8 @@ def first_order(inputs: FloatArray, result: FloatArray) -> tuple[FloatArray, Flo
     x, y = inputs[mixed], result[mixed]
     halves = (np.sort(random.permutation(rows)[: rows // 2]) for _ in range(_HALVES))
     spread = np.std([_shares(x[half], y[half]) for half in halves], axis=0)
-    return _shares(x, y), NORMAL_95 * spread
+    noise = _WAVES / rows
+    return _shares(x, y), np.maximum(NORMAL_95 * spread, noise / (1 - noise))
 
 
 def _shares(inputs: FloatArray, result: FloatArray) -> FloatArray:
@@ -50,7 +52,9 @@ def _shares(inputs: FloatArray, result: FloatArray) -> FloatArray:
     phases = np.pi * (np.arange(rows) + 0.5) / rows
     waves = np.cos(np.arange(1, _WAVES + 1)[:, None] * phases)
     parts = waves @ y[np.argsort(inputs, axis=0, kind="stable")] / rows
-    raw, noise = 2 * np.sum(parts**2, axis=0) / np.mean(y**2), _WAVES / rows
+    # Half of the rows may have one value only, which nothing decides.
+    variance = np.mean(y**2) if np.ptp(result) > 0 else np.inf
+    raw, noise = 2 * np.sum(parts**2, axis=0) / variance, _WAVES / rows
     return np.asarray((raw - noise) / (1 - noise))
 
 

@@ -14,19 +14,21 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from ringbalance.controller.balancer import balancer_of
 from ringbalance.design.axes import Plan, Point, SweepAxis, unit_of_path
-from ringbalance.design.sensitivity import first_order, total_order
+from ringbalance.design.sensitivity import MIN_ROWS, first_order, total_order
 from ringbalance.design.static import EMPTY, Record, content_of, row_reach, static_rows
 from ringbalance.design.store import Store
 from ringbalance.design.work import Done, Progress, answers, tasks_of
 from ringbalance.results.numbers import format_given, percent
-from ringbalance.results.requirements import MET
+from ringbalance.results.requirements import MET, Proportion
 from ringbalance.results.result import Result, Rows, Table, csv_text, extra
-from ringbalance.results.rows import Finding, Quantity, Value, around
+from ringbalance.results.rows import Finding, Quantity, Value, around, series
 from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.platform.display import LOG
 from ringbalance.scene.registry import registered
 
 _POINTS_PER_BATCH: Final = {True: 256, False: 1024}
@@ -85,7 +87,7 @@ class Sweep(Result):
         0.001
         >>> columns = table.columns()
         >>> list(columns)[:4]
-        ['row', 'tube.bore [m]', 'lambda [m]', 'lambda half-width [m]']
+        ['row', 'tube.bore [m]', 'lambda [m]', 'lambda input half-width [m]']
         >>> [f"{velocity:.3g}" for velocity in columns["velocity [m/s]"]]
         ['13', '14.9']
         >>> table.to_csv().splitlines()[0][:29]
@@ -159,10 +161,10 @@ class Sweep(Result):
         """Table, one list for each column, by name with SI unit such as "velocity [m/s]".
 
         In this order: `row`; the changed keys by path, for a list with names after the column of names, such
-        as "gas.name"; results without runs, each with its half-width (95 %, by the uncertain inputs; only
-        with `intervals`); with runs `devices`, `fraction` with its bounds, and `settling_time` with its upper
-        bound; `status`, `verdict`, `finding` (reason why a point has no result) and `scene sha256`. None for
-        unknown values.
+        as "gas.name"; results without runs, each with its half-width (95 %; of a liquid ring by the uncertain
+        inputs alone; only with `intervals`); with runs `devices`, `fraction` with its bounds, and
+        `settling_time` with its upper bound; `status`, `verdict`, `finding` (reason why a point has no
+        result) and `scene sha256`. None for unknown values.
         """
         return {column.head: column.values for column in self.fields()}
 
@@ -173,14 +175,15 @@ class Sweep(Result):
             if axis.names:
                 columns.append(SweepColumn(axis.head, "", [axis.name_of(point) for point in self.points]))
             for path in axis.paths:
-                values = [point.get(path) for point in self.points]
+                values = [_cell(point.get(path)) for point in self.points]
                 columns.append(SweepColumn(path, unit_of_path(self.scene, path), values))
         units = {name: unit for row in self.static for name, unit in row["units"].items()}
         for name, unit in units.items():
             pairs = [row["values"].get(name, (None, None)) for row in self.static]
             columns.append(SweepColumn(name, unit, [value for value, _ in pairs]))
             if any(width is not None for _, width in pairs):
-                columns.append(SweepColumn(f"{name} half-width", unit, [width for _, width in pairs]))
+                half_width = "input half-width" if self._flows else "half-width"
+                columns.append(SweepColumn(f"{name} {half_width}", unit, [width for _, width in pairs]))
         for key, (name, unit) in _RUN_COLUMNS.items() if self.runs else ():
             columns.append(SweepColumn(name, unit, [run[key] for run in self.driven]))
         return [
@@ -214,6 +217,8 @@ class Sweep(Result):
         """`columns` as a Dataset over the axes of a grid or the rows of a sample, with units by the CF
         conventions.
 
+        Runs of drawn devices keep no histories; `rb.simulate(table.point_scene(row)).to_xarray()` has those
+        of one run.
         Raises: ModuleNotFoundError: without xarray.
         """
         grids = self.grid()
@@ -233,9 +238,9 @@ class Sweep(Result):
     def sensitivity(self, *, total: bool = False) -> Shares:
         """Share of the variance of each result that each axis explains, and its half-width (95 %).
 
-        For samples, see `first_order`; empty for a grid, and for results with too few points.  Shares below
-        zero, or with a sum above 1, are noise of the sample: an interval that contains zero shows no
-        influence; more points narrow it.
+        For samples, see `first_order`; empty for a grid, and for results with too few points or one value.
+        Shares below zero, or with a sum above 1, are noise of the sample: an interval that contains zero
+        shows no influence; more points narrow it.
         Args: `total`: True includes interactions of an axis with others, see `total_order`.
         """
         changed = {*self.plan.paths, *(axis.head for axis in self.plan.axes)}
@@ -275,7 +280,7 @@ class Sweep(Result):
         if self.plan.sample:
             return {"row": list(range(len(self.points)))}
         return {
-            axis.head: list(axis.names) or [point[axis.head] for point in axis.grid()]
+            axis.head: list(axis.names) or [_cell(point[axis.head]) for point in axis.grid()]
             for axis in self.plan.axes
         }
 
@@ -361,7 +366,13 @@ class Sweep(Result):
                 yield Finding(code="sweep_too_coarse", values={**each, "tolerance": tolerance})
         if self.errors:
             worst = max(self.errors, key=lambda each: float(each["error"]))
-            yield Finding(code="sweep_left_out", values={**worst, "tolerance": tolerance})
+            models = series([f"{each['quantity']} {percent(each['uncertainty'])}" for each in self.errors])
+            yield Finding(code="sweep_left_out", values={**worst, "models": models})
+        widths = (width for row in self.static for _, width in row["values"].values())
+        if self._flows and any(width is not None for width in widths):
+            yield Finding(code="sweep_intervals")
+        if self.plan.sample and len(self.points) >= MIN_ROWS and not self._main_shares:
+            yield Finding(code="sweep_no_shares", values={"name": "fraction" if self.runs else "reach"})
 
     def _change_text(self, row: int) -> str:
         return ", ".join(self.axis_text(axis, row) for axis in self.plan.axes)
@@ -418,6 +429,11 @@ def check_rows(rows: Sequence[int], count: int) -> None:
             raise SceneError.of_option(option="--write", value=row, problem="no such row", allowed=allowed)
 
 
+def _cell(value: Any) -> Any:
+    """Value of a key in a table; a list as text, SI."""
+    return str([*value]) if isinstance(value, list | tuple) else value
+
+
 def _array(values: Sequence[Any]) -> Any:
     if all(value is None or isinstance(value, int | float) for value in values):
         return np.array([math.nan if value is None else value for value in values])
@@ -438,6 +454,10 @@ def run_sweep(
 ) -> Sweep:
     """Compute every point of a plan; see `sweep`."""
     points = plan.points()
+    required = balancer_of(scene).required_fraction() if runs else 0.0
+    if runs < (least := Proportion.least_met(required)):
+        values: dict[str, Value] = {"runs": runs, "required": required, "least": least}
+        LOG.warning("%s", Finding(code="sweep_never_met", values=values).text)
     rates: dict[str, float] = {}
     resumed: dict[str, int] = {}
 

@@ -62,6 +62,11 @@ class Proportion:
             return MET
         return MISSED if high < required else OPEN
 
+    @classmethod
+    def least_met(cls, required: float) -> int:
+        """Least number of devices of which all may show that a required fraction is met: n/(n + z^2)."""
+        return math.ceil(_NORMAL_95**2 * required / (1.0 - required))
+
     def _ends(self, deviations: float = _NORMAL_95) -> tuple[float, float]:
         if self.of == 0:
             return 0.0, 1.0

@@ -271,6 +271,10 @@ class Result:
             figures.save(path)
         return figures
 
+    def _history(self) -> Mapping[str, Sequence[Any]]:
+        """Histories of a run by the name of their column; empty for other results."""
+        return {}
+
     def to_pandas(self) -> Any:
         """The quantities as a DataFrame by key, a line each; SI, the unit in its column.
 
@@ -283,6 +287,8 @@ class Result:
     def to_xarray(self) -> Any:
         """The quantities as a Dataset, with names, units and ends of the 95 % interval as CF has attributes.
 
+        Of a run also its histories over "time_s", as `ringbalance simulate --csv` writes them.
+
         Raises: ModuleNotFoundError: without xarray.
         """
         array, dataset = extra("xarray", "xarray_array"), extra("xarray", "xarray_dataset")
@@ -294,6 +300,9 @@ class Result:
             )
             for each in (quantity.document() for quantity in self.rows().quantities)
         }
+        for name, values in self._history().items():
+            known = [math.nan if value is None else value for value in values]
+            variables[name] = array(known, dims=("time_s",))
         return dataset(variables, attrs={"title": self.rows().title})
 
 
@@ -303,6 +312,7 @@ class Presentation:
 
     document: Callable[[Any], dict[str, Any]]
     rows: Callable[[Any], Rows]
+    history: Callable[[Any], Mapping[str, Sequence[Any]]] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -318,3 +328,6 @@ class PresentedResult(Result):
     def rows(self) -> Rows:
         """Quantities, findings and tables."""
         return self.presentation.rows(self)
+
+    def _history(self) -> Mapping[str, Sequence[Any]]:
+        return self.presentation.history(self) if self.presentation.history else {}

@@ -50,6 +50,18 @@ def test_total_indices_are_those_of_salib() -> None:
     assert np.all(np.abs(shares - indices["ST"]) < widths + indices["ST_conf"])
 
 
+def test_the_interval_of_a_negative_share_holds_zero() -> None:
+    """Evenly spread points lack the noise that the estimate subtracts."""
+    negative = 0
+    for rows in (64, 256, 1024):
+        for seed in range(5):
+            x = sobol(3, rows, seed=seed)
+            shares, widths = first_order(x, x[:, 0] + 0.3 * x[:, 1] ** 2)
+            negative += np.count_nonzero(shares < 0)
+            assert np.all(shares + widths >= 0)
+    assert negative >= 15
+
+
 def test_intervals_hold_what_they_promise() -> None:
     """In 100 samples of x1 + x2/2, some 95 intervals hold 0.8 and 0.2."""
     random, held = np.random.default_rng(5), np.zeros(2)

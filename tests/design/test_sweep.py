@@ -16,8 +16,9 @@ import pytest
 import ringbalance as rb
 from ringbalance.controller.balancer import Draws, balancer_of, quick_balancer
 from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE, judged_all
-from ringbalance.design.static import UNITS, _row
+from ringbalance.design.static import EMPTY, UNITS, _row
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.results.requirements import MET, OPEN, Proportion
 from ringbalance.scene.models import Scene
 
 
@@ -104,7 +105,7 @@ def test_where_nothing_flows_there_is_no_drag_coefficient(paper_scene: Scene) ->
     sweep = rb.sweep(paper_scene, {"gas.pressure": [0.301e6, 0.3336e6, 0.35e6]}, check=3)
     columns = sweep.columns()
     assert [velocity > 0 for velocity in columns["velocity [m/s]"]] == [False, False, True]
-    for name in ("drag_coefficient [1]", "drag_coefficient half-width [1]"):
+    for name in ("drag_coefficient [1]", "drag_coefficient input half-width [1]"):
         assert [value is None for value in columns[name]] == [True, True, False]
     assert [row["drag_coefficient [1]"] == "" for row in table(sweep)] == [True, True, False]
 
@@ -195,6 +196,8 @@ def test_rows_that_err_by_more_than_the_tolerance_are_named(paper_scene: Scene) 
         assert bool(named) == bool(coarse)
         (worst,) = (each for each in findings if each.code == "sweep_left_out")
         assert worst.values["error"] == max(each["error"] for each in sweep.errors)
+        # The size of the models' errors is that of each quantity.
+        assert all(each["quantity"] in worst.text for each in sweep.errors)
 
 
 def test_where_no_point_serves_enough_devices_the_nearest_is_named(paper_scene: Scene) -> None:
@@ -203,6 +206,59 @@ def test_where_no_point_serves_enough_devices_the_nearest_is_named(paper_scene: 
     assert (sweep.best, sweep.nearest) == (None, 1)
     assert "sweep_nearest" in {each.code for each in sweep.rows().findings}
     assert sweep.rows().tables[1].caption == "Nearest: row 1"
+
+
+def test_intervals_of_a_sweep_say_that_they_are_of_inputs_alone(paper_scene: Scene) -> None:
+    sweep = rb.sweep(paper_scene, {"tube.bore": ["1.2 mm"]})
+    width = sweep.columns()["velocity input half-width [m/s]"][0]
+    whole = rb.calibrate(paper_scene.with_values({"tube.bore": "1.2 mm"})).quantities["velocity"]
+    assert whole.parts is not None
+    assert width == pytest.approx(whole.parts.input, rel=0.05)
+    assert width < 0.5 * whole.parts.total
+    codes = [each["code"] for each in sweep.to_dict()["findings"]]
+    assert "sweep_intervals" in codes
+    bare = rb.sweep(paper_scene, {"tube.bore": ["1.2 mm"]}, intervals=False)
+    assert "sweep_intervals" not in {each.code for each in bare.rows().findings}
+
+
+def test_too_few_devices_to_meet_a_fraction_are_named_before_they_run(
+    paper_scene: Scene, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """35 of 35 have a lower bound above 90 %, 34 of 34 one below; for 95 % 73."""
+    before: list[list[str]] = []
+
+    def run_row(*_: object, **__: object) -> dict[str, object]:
+        before.append([*caplog.messages])
+        return {**EMPTY, "verdict": OPEN}
+
+    monkeypatch.setattr("ringbalance.design.runs.run_row", run_row)
+    for required, least in ((0.9, 35), (0.95, 73)):
+        assert Proportion(count=least, of=least).verdict(required) == MET
+        assert Proportion(count=least - 1, of=least - 1).verdict(required) == OPEN
+        scene = paper_scene.with_values({"requirement.fraction": required})
+        for runs in (16, least - 1, least):
+            caplog.clear()
+            before.clear()
+            rb.sweep(scene, {"tube.bore": [1e-3]}, intervals=False, runs=runs)
+            assert before == [caplog.messages]
+            assert [f"take {least} or more" in each for each in caplog.messages] == [True] * (runs < least)
+
+
+def test_a_result_of_one_value_has_no_shares_and_says_so(paper_scene: Scene) -> None:
+    """Warnings are errors: where all devices, few or none of a point meet what is required."""
+    vary = {"tube.bore": "1mm:2mm", "gas.pressure": "0.6MPa:0.8MPa"}
+    still = rb.sweep(paper_scene, vary, sample="sobol:64", intervals=False)
+    for fractions in (np.ones(64), np.zeros(64), np.arange(64) == 5, np.arange(64) / 64):
+        driven = tuple({**EMPTY, "devices": 8, "fraction": float(each)} for each in fractions)
+        sweep = replace(still, runs=8, driven=driven)
+        varies = bool(np.ptp(fractions * 1.0))
+        for shares in (sweep.sensitivity(), sweep.sensitivity(total=True)):
+            assert ("fraction" in shares) == varies
+            assert "devices" not in shares
+            values = [part for axes in shares.values() for pair in axes.values() for part in pair]
+            assert np.isfinite(values).all()
+        named = "sweep_no_shares" in {each.code for each in sweep.rows().findings}
+        assert named == (not varies)
 
 
 def test_the_summary_of_a_sample_says_what_decides(paper_scene: Scene, valves: Path) -> None:

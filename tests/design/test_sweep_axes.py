@@ -13,6 +13,51 @@ from ringbalance.cli import main
 from ringbalance.scene.models import Scene
 
 
+@pytest.mark.parametrize(
+    ("name", "path", "text", "values"),
+    [
+        (
+            "driven_masses_small",
+            "masses.friction_arm",
+            '["60 um", "60 um"],[80um, 40um]',
+            [(6e-5, 6e-5), (8e-5, 4e-5)],
+        ),
+        ("driven_masses_small", "masses.initial_angle", "[0 deg,180deg]", [(0.0, np.pi)]),
+        (
+            "liquid_ring_paper",
+            "controller.sequence",
+            "[A,C,B,D],[A,B,C,D]",
+            [("A", "C", "B", "D"), ("A", "B", "C", "D")],
+        ),
+        (
+            "liquid_ring_paper",
+            "controller.gas_time_offset",
+            "10ms,[1ms,2ms,3ms,4ms]",
+            [(0.01,), (1e-3, 2e-3, 3e-3, 4e-3)],
+        ),
+    ],
+)
+def test_keys_that_take_lists_vary(name: str, path: str, text: str, values: list[tuple[object, ...]]) -> None:
+    """As in a scene file, with or without its quotation marks; the same in Python."""
+    scene = rb.load_scene(name)
+    table = rb.sweep(scene, {path: text}, intervals=False)
+    points = [point[path] for point in table.points]
+    assert points == [pytest.approx(each) if isinstance(each[0], float) else each for each in values]
+    again = rb.sweep(scene, {path: [list(each) for each in values]}, intervals=False)
+    assert again.to_csv() == table.to_csv()
+    assert [row["status"] for row in table.static] == ["ok"] * len(values)
+
+
+def test_a_list_of_the_wrong_length_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for values in ("40um:80um:5", "[40um]", "[40um,60um"):
+        vary = f"masses.friction_arm={values}"
+        assert main(["sweep", "driven_masses_small", "--vary", vary, "--out", str(tmp_path / "out")]) == 2
+        assert (
+            'it is not a list of 2; allowed: a list of 2 such as ["10 mm", "10 mm"]'
+            in capsys.readouterr().err
+        )
+
+
 def test_axes_of_every_kind_make_the_same_points(paper_scene: Scene, valves: Path) -> None:
     rows = [
         {"conductance": f"{each} l/(s*bar)", "critical_ratio": 0.3, "valve_lag": lag}

@@ -14,6 +14,7 @@ from matplotlib.colors import to_rgba_array
 from PIL import Image
 
 import ringbalance as rb
+from ringbalance.design.static import EMPTY
 from ringbalance.design.sweep import Sweep
 from ringbalance.reports.figure import LIGHT_RAMP
 from ringbalance.reports.sweep_figures import sweep_drawings
@@ -51,6 +52,25 @@ def test_a_map_is_drawn_for_the_page_and_for_a_column(sweep: Sweep, tmp_path: Pa
         assert float(width[1]) == pytest.approx(72 * inches, abs=1e-3)
         sizes = re.findall(r"font(?:-size)?: (?:\w+ )?([\d.]+)px", file.read_text())
         assert min(map(float, sizes)) >= 7, "smaller letters are hard to read in print"
+
+
+def test_long_labels_stay_within_a_column(paper_scene: Scene) -> None:
+    """Labels of y-axes and colour bars, over several lines where one is too long, and notes on other axes."""
+    runs = {"devices": 64, "fraction": 0.5, "settling_time": 12.0, "verdict": "not met", "finding": None}
+    for vary in (VARY, {"tube.bore": "1mm:2mm:3", "tube.entrance": ["sharp", "rounded"]}):
+        still = rb.sweep(paper_scene, vary, intervals=False)
+        driven = tuple({**EMPTY, **runs, "fraction": i / 99} for i in range(len(still.points)))
+        for drawing in sweep_drawings(replace(still, runs=64, driven=driven), width=85 / 25.4):
+            svg = drawing.standalone()
+            upright = re.findall(r'"translate\(([\d.]+) ([\d.]+)\) rotate\(-90\)">([^<]+)<', svg)
+            middle = re.findall(r' x="([\d.]+)" y="([\d.]+)" transform="rotate\(-90[^>]+>([^<]+)<', svg)
+            assert upright or middle
+            for x, bottom, text in upright:
+                assert 8 <= float(x) <= 72 * 85 / 25.4 - 2, text
+                # Letters are about half as wide as they are high.
+                assert float(bottom) - 0.6 * 8.8 * len(text) > 0, text
+            assert all(8 <= float(x) <= 72 * 85 / 25.4 - 2 for x, _, _ in middle)
+            assert max(map(len, texts(svg))) <= 46
 
 
 def test_each_cell_has_the_colour_of_its_value_and_the_bar_one_unit(sweep: Sweep) -> None:

@@ -37,7 +37,11 @@ from ringbalance.controller.eccentric_mass.plant import (
     turned,
 )
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.controller.eccentric_mass.run_rows import eccentric_document, eccentric_rows
+from ringbalance.controller.eccentric_mass.run_rows import (
+    eccentric_document,
+    eccentric_history,
+    eccentric_rows,
+)
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.step import begin_strategy, strategy_step
@@ -251,7 +255,7 @@ def simulate_eccentric(
             break
     # The energy of the last sample's voltage would be spent after the run.
     history["energy"] = np.concatenate([[0.0], history["energy"][:-1]])
-    presentation = Presentation(document=eccentric_document, rows=eccentric_rows)
+    presentation = Presentation(document=eccentric_document, rows=eccentric_rows, history=eccentric_history)
     return EccentricRun(scene=scene, history=history, memory=memory[0], presentation=presentation)
 
 

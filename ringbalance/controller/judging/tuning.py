@@ -310,6 +310,7 @@ class Tuning(Result):
         if clipped := best.outcomes.clipped:
             values = {"count": float(sum(clipped.values())), "of": best.fraction.of, "inputs": list(clipped)}
             yield Finding(code="inputs_clipped", values=values)
+        yield from self.information.findings
 
 
 def if_exact(scene: SceneFile, judgement: Judgement) -> str:

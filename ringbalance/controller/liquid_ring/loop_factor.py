@@ -50,6 +50,10 @@ from ringbalance.scene.models import Scene
 _FILL_STEP: Final = 1e-4
 """Half the distance over which the slope of a moment is taken, as a fraction of the range of fills."""
 _DEVIATIONS: Final = 3.0
+_SMALL_GAIN_MARGIN: Final = 1.1
+"""Gain margin below which a loop is near instability: rotor and flow are seldom known more closely."""
+_SMALL_PHASE_MARGIN_RAD: Final = math.radians(10.0)
+"""Phase margin likewise: about three times the half-width with which a lag angle is measured."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,6 +126,17 @@ def default_gain(scene: Scene) -> Iterator[Finding]:
     """Finding that a loop is judged by a gain that its scene does not give."""
     if scene.origin_of("controller.proportional") == "default":
         yield Finding(code="default_gain", values={"proportional": scene.controller.proportional})
+
+
+def small_margin(scene: Scene, margins: Margins | None) -> Iterator[Finding]:
+    """Finding that a stable loop is near instability."""
+    if margins is None or not margins.stable:
+        return
+    if margins.gain_factor < _SMALL_GAIN_MARGIN:
+        yield Finding(code="gain_margin_small", values={"factor": margins.gain_factor})
+    elif margins.phase < _SMALL_PHASE_MARGIN_RAD:
+        error = math.remainder(scene.controller.assumed_lag_angle - scene.rotor.lag_angle, math.tau)
+        yield Finding(code="phase_margin_small", values={"phase": margins.phase, "error": abs(error)})
 
 
 def vibration_left(scene: Scene, loop: LoopFactor) -> float | None:
@@ -330,6 +345,7 @@ def loop_information(scene: Scene, model: BalancerModel) -> Information:
             ("gas jet", jet_text(scene)),
         ],
         document=document,
+        findings=tuple(small_margin(scene, margins)),
     )
 
 

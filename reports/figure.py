@@ -483,8 +483,8 @@ def _fit(axes: Axes) -> None:
     tall, text = label.get_window_extent().height / axes.bbox.height, label.get_text()
     if tall > 1:
         label.set_text(fill(text, int(len(text) / tall)))
-    drawn, box, across = figure.get_tightbbox(), axes.get_position(), figure.get_figwidth()
-    left, right = max(-drawn.x0 / across, 0.0), max(drawn.x1 / across - 1.0, 0.0)
+    extent, box, across = figure.get_tightbbox(), axes.get_position(), figure.get_figwidth()
+    left, right = max(-extent.x0 / across, 0.0), max(extent.x1 / across - 1.0, 0.0)
     axes.set_position((box.x0 + left, box.y0, box.width - left - right, box.height))
 
 

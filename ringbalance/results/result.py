@@ -301,8 +301,8 @@ class Result:
             for each in (quantity.document() for quantity in self.rows().quantities)
         }
         for name, values in self._history().items():
-            known = [math.nan if value is None else value for value in values]
-            variables[name] = array(known, dims=("time_s",))
+            numbers = [math.nan if value is None else value for value in values]
+            variables[name] = array(numbers, dims=("time_s",))
         return dataset(variables, attrs={"title": self.rows().title})
 
 

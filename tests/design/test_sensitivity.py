@@ -57,7 +57,7 @@ def test_the_interval_of_a_negative_share_holds_zero() -> None:
         for seed in range(5):
             x = sobol(3, rows, seed=seed)
             shares, widths = first_order(x, x[:, 0] + 0.3 * x[:, 1] ** 2)
-            negative += np.count_nonzero(shares < 0)
+            negative += int(np.count_nonzero(shares < 0))
             assert np.all(shares + widths >= 0)
     assert negative >= 15
 

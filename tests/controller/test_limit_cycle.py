@@ -116,5 +116,5 @@ def test_a_gain_near_its_limit_is_near_instability() -> None:
     highest = scene.controller.proportional * loop.limit / loop.value
     for part, named in ((0.95, True), (0.85, False)):
         near = rb.load_scene("grinding_spindle").with_values({"controller.proportional": part * highest})
-        findings = rb.simulate(near, flow_law=model.flow).findings
+        findings = simulate(liquid_ring_scene(near), model).findings
         assert ("gain_margin_small" in {each.code for each in findings}) == named

@@ -23,7 +23,7 @@ from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.loop_records import LOOP, RUN
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.export import chamber, disc, law_based
+from ringbalance.export import disc, law_based
 from ringbalance.export.compact import VELOCITIES, CompactLaw, Tables, compact_law
 from ringbalance.export.translate import Source, number_text, python_functions
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -45,6 +45,8 @@ _SHORTEST_PART_S: Final = 1e-6
 PART_OF_TIME_CONSTANT: Final = 0.04
 """Longest part over the line's time constant: near the end of a filling a pressure changes some fifty times
 as fast, and the method is stable for parts up to 2.8 over that rate."""
+_LAW_FUNCTIONS: Final = ("answer", "surface_radius", "moment", "moment_uncertainty")
+"""Functions of a law, which a caller may ask for by themselves."""
 RANGE: Final = "{:g} to {:g} m/s".format(*VELOCITIES)
 
 
@@ -95,17 +97,24 @@ class Block:
     modules: tuple[ModuleType, ...]
     steps: str
     """Name of the function that advances by a time and updates the outputs; that of the law only updates."""
-    timed: bool
-    """True if a step advances by a time."""
     variables: tuple[Variable, ...]
     period: float = 0.01
     """Time of a step where a host is given none, s."""
     flat: Source | None = None
     """The source in place of that of `modules`; it uses sin, cos, atan, acos, exp and log of the host."""
+    legend: tuple[str, ...] = ()
+    """Lines that say what stands where in the constants `c` and the row `w`, for a reader of the source."""
 
     def source(self, entries: Sequence[str] = ()) -> Source:
-        """Source of some functions and all that they call; default of the one that a host calls."""
-        return self.flat or Source.of_modules(self.modules, entries or (self.steps,))
+        """Source of some functions and all that they call; default of those that a caller may ask for."""
+        return self.flat or Source.of_modules(
+            self.modules, entries or (_LAW_FUNCTIONS if self.kind == "law" else (self.steps,))
+        )
+
+    @property
+    def timed(self) -> bool:
+        """True if a step advances by a time."""
+        return self.kind != "law"
 
     @property
     def size(self) -> int:
@@ -136,8 +145,7 @@ class Block:
 
 def law_block(law: CompactLaw) -> Block:
     """The law alone: its outputs follow from its inputs."""
-    half = law.max_fill_ratio / 2
-    row = [half, half] + [0.0] * (point.PLACES_OF_QUERY - 2)
+    most = law.max_fill_ratio
     return Block(
         kind="law",
         title="Flow law of a liquid-ring balancer",
@@ -145,11 +153,10 @@ def law_block(law: CompactLaw) -> Block:
         facts=tabulation(law),
         constants=law.constants,
         tables=law.tables,
-        start=tuple(row),
-        modules=(point, query, chamber),
+        start=(most / 2, most / 2, *(0.0,) * (point.PLACES_OF_QUERY - 2)),
+        modules=(point, query),
         steps="answer_all",
-        timed=False,
-        variables=variables_of("law", lambda offset, _: int(getattr(point, offset)), most=law.max_fill_ratio),
+        variables=variables_of("law", lambda offset, _: int(getattr(point, offset)), most=most),
     )
 
 
@@ -191,9 +198,8 @@ def disc_block(scene: Scene, law: CalibratedLaw, *, compact: CompactLaw | None =
         constants=tuple(constants),
         tables=compact.tables,
         start=tuple(row),
-        modules=(point, query, chamber, disc),
+        modules=(point, query, disc),
         steps="step",
-        timed=True,
         variables=variables_of("disc", index_of, most=law.max_fill_ratio, chambers=scene.disc.chambers),
     )
 
@@ -290,7 +296,6 @@ def controller_block(
         start=(0.0,) * (steps.FIRST_CHAMBER + valve_steps.PER_CHAMBER * chambers),
         modules=(point, valve_steps, steps),
         steps="step",
-        timed=True,
         variables=variables_of("controller", index_of, chambers=chambers),
     )
 
@@ -304,15 +309,12 @@ def _law_based_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw | Non
     loop, run = np.zeros(1, dtype=LOOP)[0], np.zeros(1, dtype=RUN)[0]
     LawBased(scene=scene, model=BalancerModel.of(law)).fill(loop, run)
     constants += (
-        float(loop["rest_limit"]),
-        float(loop["minimum_gas_time"]),
-        float(loop["maximum_gas_time"]),
-        float(loop["probe"]),
-        float(loop["least_fill"]),
+        *map(float, loop[["rest_limit", "minimum_gas_time", "maximum_gas_time", "probe", "least_fill"]]),
         abs(complex(loop["influence"])),
-        float(loop["law_deviation"]) ** 2,
-        float(loop["assumed_amplitude_noise"]) ** 2,
-        float(loop["assumed_phase_noise"]) ** 2,
+        *(
+            x**2
+            for x in map(float, loop[["law_deviation", "assumed_amplitude_noise", "assumed_phase_noise"]])
+        ),
         *loop["offset"][:chambers].tolist(),
     )
     host = law_steps.change_of(r, half)
@@ -336,9 +338,8 @@ def _law_based_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw | Non
         constants=tuple(constants),
         tables=compact.tables,
         start=tuple(row),
-        modules=(point, query, chamber, disc, valve_steps, law_steps, law_based),
+        modules=(point, query, disc, valve_steps, law_steps, law_based),
         steps="control",
-        timed=True,
         variables=variables_of("controller", index_of, chambers=chambers),
     )
 

@@ -9,8 +9,7 @@ from typing import Final
 from ringbalance.export.blocks import Block, controller_block, disc_block, law_block
 from ringbalance.export.compact import CompactLaw, compact_law
 from ringbalance.export.fmu import fmu_bytes
-from ringbalance.export.grid import csv_files
-from ringbalance.export.hosts import c_files, identifier, js_files, python_files, st_files
+from ringbalance.export.hosts import c_files, csv_files, identifier, js_files, python_files, st_files
 from ringbalance.export.libraries import EXTRA
 from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model.calibration import chamber_and_law

@@ -10,33 +10,12 @@ names.
 
 from math import sqrt
 
-from ringbalance.export.chamber import moment
-from ringbalance.reduced_model.pieces.point import (
-    AMBIENT,
-    BLOCK,
-    BLOCKED,
-    DOWN_GAS,
-    GAS_FACTOR,
-    LARGEST_FILL,
-    PRIMED,
-    PRIMED_AFTER,
-    REGIME,
-    UP_GAS,
-    VELOCITY,
-    Cells,
-    Law,
-    Levels,
-    Pieces,
-    Query,
-    larger,
-    set_levels,
-    smaller,
-    within,
-)
-from ringbalance.reduced_model.pieces.query import set_answer
+from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces.point import Cells, Law, Levels, Pieces, Query
+from ringbalance.reduced_model.pieces.query import moment, set_answer
 
 # fmt: off
-# Constants from index c[BLOCK] on; from DIRECTIONS on, the direction of each pair's positive chamber.
+# Constants from index c[point.BLOCK] on; from DIRECTIONS on, the direction of each pair's positive chamber.
 PAIRS, TOTAL, PER_SECOND, VOLUME, DEAD, SUPPLY, LAG, RESIDUAL, LONGEST = 0, 1, 2, 3, 4, 5, 6, 7, 8
 LINE, PASSING, CRITICAL, WARMTH, RATIO, TEMPERATURE_VARIES = 9, 10, 11, 12, 13, 14
 OUTSIDE, LEAK, LEAK_IN = 15, 16, 17
@@ -54,18 +33,18 @@ LAMINAR, LEAST_GAS, CLOSE, SHORTEST = 0.999, 1e-3, 1e-9, 1e-7
 
 def gas_volume(c: Law, fill: float) -> float:
     """Volume of the gas that belongs to a chamber, m^3."""
-    d = int(c[BLOCK])
-    return larger(1.0 - fill, LEAST_GAS) * c[d + VOLUME] + c[d + DEAD]
+    d = int(c[point.BLOCK])
+    return point.larger(1.0 - fill, LEAST_GAS) * c[d + VOLUME] + c[d + DEAD]
 
 
 def passed(c: Law, ratio: float) -> float:
     """Mass flow over its choked value by the ratio of the pressures."""
-    b = c[int(c[BLOCK]) + CRITICAL]
+    b = c[int(c[point.BLOCK]) + CRITICAL]
     if ratio <= b:
         return 1.0
-    turbulent = smaller(ratio, larger(LAMINAR, b))
+    turbulent = point.smaller(ratio, point.larger(LAMINAR, b))
     part = (turbulent - b) / (1.0 - b)
-    ellipse = sqrt(larger(1.0 - part * part, 0.0))
+    ellipse = sqrt(point.larger(1.0 - part * part, 0.0))
     if ratio > turbulent:
         return ellipse * (1.0 - ratio) / (1.0 - turbulent)
     return ellipse
@@ -75,32 +54,27 @@ def add_gas_flow(
     c: Law, w: Query, at: int, side: int, volume: float, growth: float, passing: float, outside: float
 ) -> None:
     """Add the rates of a chamber's gas by the flow through one conductance to a pressure outside."""
-    d = int(c[BLOCK])
-    pressure = w[at + GAS + side]
-    warmth = c[d + WARMTH]
+    d = int(c[point.BLOCK])
+    pressure, warmth = w[at + GAS + side], c[d + WARMTH]
     if pressure <= outside:
         flow = passing * outside * passed(c, pressure / outside)
     else:
         if c[d + TEMPERATURE_VARIES] != 0.0:
-            warmth = pressure * volume / larger(w[at + CONTENT + side], 1e-9 * volume)
+            warmth = pressure * volume / point.larger(w[at + CONTENT + side], 1e-9 * volume)
         flow = -passing * sqrt(warmth / c[d + WARMTH]) * pressure * passed(c, outside / pressure)
-    w[RATES + GAS + side] = w[RATES + GAS + side] + (flow - pressure * growth) * c[d + RATIO] / volume
-    w[RATES + CONTENT + side] = w[RATES + CONTENT + side] + flow / warmth
+    w[RATES + GAS + side] += (flow - pressure * growth) * c[d + RATIO] / volume
+    w[RATES + CONTENT + side] += flow / warmth
 
 
 def set_gas_rates(c: Law, w: Query, at: int, side: int, fill: float, growth: float) -> None:
     """Rates of a chamber's pressure, Pa/s, and content p V/T, W/K, with the growth of its volume, m^3/s."""
-    d = int(c[BLOCK])
-    w[RATES + GAS + side] = 0.0
-    w[RATES + CONTENT + side] = 0.0
+    d = int(c[point.BLOCK])
+    w[RATES + GAS + side] = w[RATES + CONTENT + side] = 0.0
     if c[d + LINE] == 0.0:
         return
-    volume = gas_volume(c, fill)
-    outside = c[d + OUTSIDE]
-    leak_in = c[d + LEAK_IN]
+    volume, outside, leak_in = gas_volume(c, fill), c[d + OUTSIDE], c[d + LEAK_IN]
     if w[at + VALVE + side] != 0.0:
-        outside = c[d + SUPPLY]
-        leak_in = 0.0
+        outside, leak_in = c[d + SUPPLY], 0.0
     add_gas_flow(c, w, at, side, volume, growth, c[d + PASSING], outside)
     if c[d + LEAK] > 0.0:
         add_gas_flow(c, w, at, side, volume, 0.0, c[d + LEAK], c[d + OUTSIDE])
@@ -110,32 +84,33 @@ def set_gas_rates(c: Law, w: Query, at: int, side: int, fill: float, growth: flo
 
 def set_tube(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:
     """Velocity out of a pair's positive chamber, by the law."""
-    set_levels(c, k, q, w, within(c, w[at + X]), within(c, c[int(c[BLOCK]) + TOTAL] - w[at + X]))
-    w[UP_GAS] = c[GAS_FACTOR] * (w[at + GAS] - c[AMBIENT])
-    w[DOWN_GAS] = c[GAS_FACTOR] * (w[at + GAS + 1] - c[AMBIENT])
-    w[PRIMED] = w[at + IS_PRIMED]
+    point.set_levels(
+        c, k, q, w, point.within(c, w[at + X]), point.within(c, c[int(c[point.BLOCK]) + TOTAL] - w[at + X])
+    )
+    w[point.UP_GAS] = c[point.GAS_FACTOR] * (w[at + GAS] - c[point.AMBIENT])
+    w[point.DOWN_GAS] = c[point.GAS_FACTOR] * (w[at + GAS + 1] - c[point.AMBIENT])
+    w[point.PRIMED] = w[at + IS_PRIMED]
     if set_answer(c, k, p, w):
-        w[VELOCITY] = -w[VELOCITY]
+        w[point.VELOCITY] = -w[point.VELOCITY]
 
 
 def keep_primed(w: Query, flag: int) -> None:
     """Record if the tube holds a continuous column; unchanged while a separated column flows."""
-    if w[PRIMED_AFTER] != 0.0:
+    if w[point.PRIMED_AFTER] != 0.0:
         w[flag] = 1.0
-    elif w[REGIME] == BLOCKED:
+    elif w[point.REGIME] == point.BLOCKED:
         w[flag] = 0.0
 
 
 def set_rates(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:
     """Rates of a pair's fill, 1/s, and of its gases."""
-    d = int(c[BLOCK])
+    d = int(c[point.BLOCK])
     set_tube(c, k, p, q, w, at)
-    x = w[at + X]
-    total = c[d + TOTAL]
-    rate = -c[d + PER_SECOND] * w[VELOCITY]
-    if rate < 0.0 and x <= larger(0.0, total - c[LARGEST_FILL]):
+    x, total = w[at + X], c[d + TOTAL]
+    rate = -c[d + PER_SECOND] * w[point.VELOCITY]
+    if rate < 0.0 and x <= point.larger(0.0, total - c[point.LARGEST_FILL]):
         rate = 0.0
-    if rate > 0.0 and x >= smaller(total, c[LARGEST_FILL]):
+    if rate > 0.0 and x >= point.smaller(total, c[point.LARGEST_FILL]):
         rate = 0.0
     w[RATES] = rate
     growth = rate * c[d + VOLUME]
@@ -145,20 +120,16 @@ def set_rates(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None
 
 def take(w: Query, at: int, weight: float, time: float) -> None:
     """Add weighted rates to their sum, and set the state that they give a time after a part's beginning."""
-    i = 0
-    while i < STATES:
-        w[SUM + i] = w[SUM + i] + weight * w[RATES + i]
+    for i in range(STATES):
+        w[SUM + i] += weight * w[RATES + i]
         w[at + i] = w[BEFORE + i] + time * w[RATES + i]
-        i = i + 1
 
 
 def move(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int, time: float) -> None:
     """One part of a step of a pair."""
-    i = 0
-    while i < STATES:
+    for i in range(STATES):
         w[BEFORE + i] = w[at + i]
         w[SUM + i] = 0.0
-        i = i + 1
     set_rates(c, k, p, q, w, at)
     take(w, at, 1.0, time / 2.0)
     set_rates(c, k, p, q, w, at)
@@ -167,104 +138,88 @@ def move(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int, time: float)
     take(w, at, 2.0, time)
     set_rates(c, k, p, q, w, at)
     take(w, at, 1.0, time)
-    i = 0
-    while i < STATES:
+    for i in range(STATES):
         w[at + i] = w[BEFORE + i] + time / 6.0 * w[SUM + i]
-        i = i + 1
-    total = c[int(c[BLOCK]) + TOTAL]
-    most = c[LARGEST_FILL]
-    w[at + X] = larger(larger(0.0, total - most), smaller(w[at + X], smaller(total, most)))
+    total, most = c[int(c[point.BLOCK]) + TOTAL], c[point.LARGEST_FILL]
+    w[at + X] = point.larger(
+        point.larger(0.0, total - most), point.smaller(w[at + X], point.smaller(total, most))
+    )
 
 
 def command(c: Law, w: Query, at: int) -> None:
     """Valves open and close a lag after their command."""
-    lag = c[int(c[BLOCK]) + LAG]
-    side = 0
-    while side < 2:
+    lag = c[int(c[point.BLOCK]) + LAG]
+    for side in range(2):
         if w[at + ASKED + side] > 0.0:
             if w[at + CLOSES + side] <= 0.0:
-                w[at + HELD] = 0.0
-                w[at + HELD + 1] = 0.0
+                w[at + HELD] = w[at + HELD + 1] = 0.0
                 w[at + OPENS + side] = lag
                 if lag <= 0.0:
                     w[at + VALVE + side] = 1.0
             w[at + CLOSES + side] = w[at + ASKED + side] + lag
-        side = side + 1
 
 
 def settle(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:
     """Before a part: valves close at the residual fill, gas may fill at once, the tube may be primed."""
-    d = int(c[BLOCK])
-    side = 0
-    fill = w[at + X]
+    d = int(c[point.BLOCK])
+    side, fill = 0, w[at + X]
     while side < 2:
         if w[at + VALVE + side] != 0.0 and fill - c[d + RESIDUAL] < CLOSE:
-            w[at + VALVE + side] = 0.0
-            w[at + OPENS + side] = 0.0
-            w[at + CLOSES + side] = 0.0
+            w[at + VALVE + side] = w[at + OPENS + side] = w[at + CLOSES + side] = 0.0
             w[at + HELD + side] = 1.0
         if c[d + LINE] == 0.0:
-            w[at + GAS + side] = c[AMBIENT]
+            w[at + GAS + side] = c[point.AMBIENT]
             if w[at + VALVE + side] != 0.0:
                 w[at + GAS + side] = c[d + SUPPLY]
         fill = c[d + TOTAL] - w[at + X]
-        side = side + 1
+        side += 1
     set_tube(c, k, p, q, w, at)
     keep_primed(w, at + IS_PRIMED)
 
 
 def length(c: Law, w: Query, at: int, left: float) -> float:
     """Length of the next part, s: until a valve moves, or a driven chamber comes to its residual fill."""
-    d = int(c[BLOCK])
-    part = smaller(left, c[d + LONGEST])
-    falls = c[d + PER_SECOND] * w[VELOCITY]
+    d = int(c[point.BLOCK])
+    part = point.smaller(left, c[d + LONGEST])
+    falls = c[d + PER_SECOND] * w[point.VELOCITY]
     fill = w[at + X]
-    side = 0
-    while side < 2:
+    for side in range(2):
         if w[at + OPENS + side] > 0.0:
-            part = smaller(part, w[at + OPENS + side])
+            part = point.smaller(part, w[at + OPENS + side])
         if w[at + CLOSES + side] > 0.0:
-            part = smaller(part, w[at + CLOSES + side])
+            part = point.smaller(part, w[at + CLOSES + side])
         if w[at + VALVE + side] != 0.0 and falls > 0.0:
-            part = smaller(part, larger((fill - c[d + RESIDUAL]) / falls, SHORTEST))
+            part = point.smaller(part, point.larger((fill - c[d + RESIDUAL]) / falls, SHORTEST))
         fill = c[d + TOTAL] - w[at + X]
         falls = -falls
-        side = side + 1
     return part
 
 
 def tick(w: Query, at: int, time: float) -> None:
     """Advance the clocks of the valves."""
-    side = 0
-    while side < 2:
+    for side in range(2):
         if w[at + OPENS + side] > 0.0:
-            w[at + OPENS + side] = w[at + OPENS + side] - time
+            w[at + OPENS + side] -= time
             if w[at + OPENS + side] <= 0.0:
                 w[at + OPENS + side] = 0.0
                 w[at + VALVE + side] = 1.0
         if w[at + CLOSES + side] > 0.0:
-            w[at + CLOSES + side] = w[at + CLOSES + side] - time
+            w[at + CLOSES + side] -= time
             if w[at + CLOSES + side] <= 0.0:
-                w[at + CLOSES + side] = 0.0
-                w[at + VALVE + side] = 0.0
-        side = side + 1
+                w[at + CLOSES + side] = w[at + VALVE + side] = 0.0
 
 
 def show(c: Law, k: Cells, p: Pieces, w: Query) -> None:
     """Show fills, the disc's moment, kg m, and the vibration with it, m."""
-    d = int(c[BLOCK])
-    w[MOMENT_X] = 0.0
-    w[MOMENT_Y] = 0.0
-    pair = 0
-    while pair < int(c[d + PAIRS]):
-        at = FIRST_PAIR + PER_PAIR * pair
-        axis = d + DIRECTIONS + 2 * pair
+    d = int(c[point.BLOCK])
+    w[MOMENT_X] = w[MOMENT_Y] = 0.0
+    for pair in range(int(c[d + PAIRS])):
+        at, axis = FIRST_PAIR + PER_PAIR * pair, d + DIRECTIONS + 2 * pair
         w[at + LIQUID] = w[at + X]
         w[at + LIQUID + 1] = c[d + TOTAL] - w[at + X]
         difference = moment(c, k, p, w[at + LIQUID]) - moment(c, k, p, w[at + LIQUID + 1])
-        w[MOMENT_X] = w[MOMENT_X] + difference * c[axis]
-        w[MOMENT_Y] = w[MOMENT_Y] + difference * c[axis + 1]
-        pair = pair + 1
+        w[MOMENT_X] += difference * c[axis]
+        w[MOMENT_Y] += difference * c[axis + 1]
     x = c[d + INFLUENCE_X] * w[MOMENT_X] - c[d + INFLUENCE_Y] * w[MOMENT_Y]
     y = c[d + INFLUENCE_X] * w[MOMENT_Y] + c[d + INFLUENCE_Y] * w[MOMENT_X]
     w[VIBRATION_X] = c[d + START_X] + x
@@ -279,15 +234,13 @@ def pass_pair(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int, time: f
         part = length(c, w, at, left)
         move(c, k, p, q, w, at, part)
         tick(w, at, part)
-        left = left - part
+        left -= part
 
 
 def step(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, time: float) -> None:
     """Let a time pass, s, with each valve open from its beginning on for its commanded time."""
-    pair = 0
-    while pair < int(c[int(c[BLOCK]) + PAIRS]):
+    for pair in range(int(c[int(c[point.BLOCK]) + PAIRS])):
         at = FIRST_PAIR + PER_PAIR * pair
         command(c, w, at)
         pass_pair(c, k, p, q, w, at, time)
-        pair = pair + 1
     show(c, k, p, w)

@@ -1,10 +1,13 @@
 """Compiled functions on records, complex numbers and tuples, as functions of numbers on two rows.
 
 What `translate` writes in other languages has numbers, rows, `if` and `while` alone.  Here a record (an
-element of a numpy array, or a named tuple) becomes a place in a row: of `c` if it is constant, else of `w`.
-A complex number becomes two numbers and a tuple its values; a function that returns several leaves them in
-places of its own behind `w`.  A loop stays one, unless it indexes a tuple: it is then written out.  What is
-evaluated, and in which order, stays the same.
+element of a numpy array, or a named tuple; of any depth) becomes a place in a row: of `c` if it is constant,
+else of `w`.  A complex number becomes two numbers and a tuple its values; a function that returns several
+leaves them in places of its own behind `w`.  A loop stays one, unless it indexes a tuple: it is then written
+out.  What is evaluated, and in which order, stays the same.
+
+The functions of the liquid ring need none of this: they are functions of two rows already, since every host
+indexes these, and go to `translate` as they stand.
 """
 
 from __future__ import annotations
@@ -16,38 +19,77 @@ import re
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final, TypeAlias, TypeVar, cast
+from math import atan, exp, log, sqrt
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from ringbalance.export import host_math
-from ringbalance.export.rows import COMPLEX, FINITE_INFINITY, Layout, numbers_of
-from ringbalance.export.translate import LAW, MATHS, NOTHING, NUMBER, QUERY, TRUTH, WHOLE, Source
+from ringbalance.export.translate import BINARY, C99, LAW, MATHS, NOTHING, NUMBER, QUERY, TRUTH, WHOLE, Source
 
+FINITE_INFINITY: Final = 1e150
+"""Number in place of an infinity, with a finite square."""
+COMPLEX: Final = ("real", "imag")
+_KINDS: Final = {bool: TRUTH, np.bool_: TRUTH, int: WHOLE, np.int64: WHOLE, float: NUMBER, np.float64: NUMBER}
 _ROWS: Final = {"c": LAW, "w": QUERY}
-_SIGNS: Final = dict(
-    zip(
-        (
-            ast.Add,
-            ast.Sub,
-            ast.Mult,
-            ast.Div,
-            ast.FloorDiv,
-            ast.Lt,
-            ast.LtE,
-            ast.Gt,
-            ast.GtE,
-            ast.Eq,
-            ast.NotEq,
-        ),
-        ("+", "-", "*", "/", "//", "<", "<=", ">", ">=", "==", "!="),
-        strict=True,
-    )
-)
+_SIGNS: Final[dict[type, str]] = {**C99.operators, **BINARY, ast.FloorDiv: "//"}
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Places of a value in a row: of a number, of an array or tuple, or of a record."""
+
+    size: int
+    kind: str = ""
+    """Type of a number; empty for several."""
+    parts: tuple[Layout, ...] = ()
+    names: tuple[str, ...] = ()
+    """Names of the parts; empty for an array or a tuple."""
+    owner: str = ""
+    """Name of the record."""
+
+    @classmethod
+    def of(cls, value: Any, owner: str = "") -> Layout:
+        """Layout of a value. Args: `owner`: name of an element of a numpy array."""
+        if (kind := _KINDS.get(type(value))) is not None:
+            return cls(1, kind)
+        names, parts = parts_of(value)
+        if hasattr(value, "_fields"):
+            owner = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(value).__name__.strip("_")).lower()
+        inner = tuple(cls.of(each, names[i] if names else owner) for i, each in enumerate(parts))
+        return cls(sum(each.size for each in inner), "", inner, names, owner)
+
+    def start(self, part: int) -> int:
+        """Place of a part."""
+        return sum(each.size for each in self.parts[:part])
+
+    def index(self, path: str) -> int:
+        """Place of a number, such as "memory.friction.1.arm"."""
+        step, _, rest = path.partition(".")
+        if not step:
+            return 0
+        part = int(step) if step.isdigit() else self.names.index(step)
+        return self.start(part) + self.parts[part].index(rest)
+
+
+def parts_of(value: Any) -> tuple[tuple[str, ...], list[Any]]:
+    """Parts of a value with their names, if it has some."""
+    if isinstance(value, complex):
+        return COMPLEX, [float(value.real), float(value.imag)]
+    names = getattr(value, "_fields", ()) or (isinstance(value, np.void) and value.dtype.names) or ()
+    return tuple(names), [value[i] for i in range(len(value))]
+
+
+def numbers_of(value: Any) -> list[float]:
+    """Numbers of a value, in the order of its layout."""
+    if type(value) in _KINDS:
+        return [min(max(float(value), -FINITE_INFINITY), FINITE_INFINITY)]
+    return [number for each in parts_of(value)[1] for number in numbers_of(each)]
 
 
 @dataclass(frozen=True)
 class _Scalar:
+    """Number, as an expression of the subset."""
+
     text: str
     kind: str
 
@@ -77,9 +119,13 @@ class _Compound:
     values: tuple[_Value, ...]
     names: tuple[str, ...] = ()
 
+    def labelled(self, name: str) -> Iterator[tuple[str, _Value]]:
+        """Parts with names of local variables."""
+        labels = self.names or map(str, range(len(self.values)))
+        return ((f"{name}_{label}", each) for label, each in zip(labels, self.values, strict=True))
+
 
 _Value: TypeAlias = _Scalar | _RowPart | _Compound
-_Some = TypeVar("_Some", bound=_Value)
 
 
 class _Varying(Exception):  # noqa: N818
@@ -88,9 +134,7 @@ class _Varying(Exception):  # noqa: N818
 
 def _constant(value: float) -> _Scalar:
     kind = TRUTH if isinstance(value, bool) else WHOLE if isinstance(value, int) else NUMBER
-    return _Scalar(
-        repr(min(max(float(value), -FINITE_INFINITY), FINITE_INFINITY) if kind == NUMBER else value), kind
-    )
+    return _Scalar(repr(numbers_of(value)[0] if kind == NUMBER else value), kind)
 
 
 def _as(value: _Scalar, kind: str) -> str:
@@ -121,15 +165,14 @@ def _leaves(value: _Value) -> list[_Scalar]:
     return [leaf for each in value.values for leaf in _leaves(each)]
 
 
-def _mapped(value: _Some, change: Callable[[_Scalar], _Scalar]) -> _Some:
+def _mapped(value: Any, change: Callable[[_Scalar], _Scalar]) -> Any:
     """A value with all its numbers changed; a part of a row stays."""
-    changed: Any = value
     match value:
         case _Scalar():
-            changed = change(value)
+            return change(value)
         case _Compound(values=values, names=names):
-            changed = _Compound(tuple(_mapped(each, change) for each in values), names)
-    return cast(_Some, changed)
+            return _Compound(tuple(_mapped(each, change) for each in values), names)
+    return value
 
 
 def _shape(value: _Value) -> Any:
@@ -193,9 +236,8 @@ class Flattening:
             # No name may be one of a host's functions or of its variables.
             name = re.sub("^_+|^(?=.*_(step|start)$)", "do_", function.__name__)
             versions = sum(each is function for each, _ in self._done)
-            self._done[key] = _FunctionWriter(
-                self, function, f"{name}_{versions + 1}" if versions else name
-            ).written(arguments)
+            name = f"{name}_{versions + 1}" if versions else name
+            self._done[key] = _FunctionWriter(self, function, name).written(arguments)
         return self._done[key]
 
 
@@ -217,8 +259,7 @@ class _FunctionWriter:
         for each, value in zip(node.args.args, arguments, strict=True):
             self.variables[each.arg] = self._parameter(_local(each.arg), value, types)
         documented = ast.get_docstring(node)
-        lines = self._block(node.body[bool(documented) :]) or ["return"]
-        lines, used = _needed(lines)
+        lines, used = _needed(self._block(node.body[bool(documented) :]) or ["return"])
         result = self.result.kind if isinstance(self.result, _Scalar) else NOTHING
         listed = ", ".join(f"{name}: {kind}" for name, kind in (_ROWS | types).items() if name in used)
         summary = (documented or self.name).split("\n")[0]
@@ -232,11 +273,11 @@ class _FunctionWriter:
             case _Scalar(kind=kind):
                 types[name] = kind
                 return _Scalar(name, kind)
-            case _RowPart(at=at):
+            case _RowPart(row=row, layout=layout, at=at):
                 if at != "0":
                     types[name], at = WHOLE, name
-                return _RowPart(value.row, value.layout, at)
-        parts = (self._parameter(label, each, types) for label, each in _labelled(name, value))
+                return _RowPart(row, layout, at)
+        parts = (self._parameter(label, each, types) for label, each in value.labelled(name))
         return _Compound(tuple(parts), value.names)
 
     # Statements.
@@ -288,12 +329,12 @@ class _FunctionWriter:
 
     def _for(self, name: str, ends: list[str], body: Sequence[ast.stmt]) -> None:
         first, last = ("0", *ends)[-2:]
-        saved, outer, length = dict(self.variables), self.out, len(self.out)
+        saved, outer, length, index = dict(self.variables), self.out, len(self.out), _local(name)
         try:
-            self.variables[name] = self._local(_local(name), _Scalar(first, WHOLE))
+            self.variables[name] = self._local(index, _Scalar(first, WHOLE))
             end = self._simple(_Scalar(last, WHOLE)).text
-            count = [f"{_local(name)} = {_local(name)} + 1"]
-            self.out += [f"while {_local(name)} < {end}:", *_indented([*self._block(body), *count])]
+            lines = [*self._block(body), f"{index} = {index} + 1"]
+            self.out += [f"while {index} < {end}:", *_indented(lines)]
         except _Varying:
             self.variables, self.out = saved, outer
             del outer[length:]
@@ -304,13 +345,10 @@ class _FunctionWriter:
                 self.out += self._block(body)
 
     def _return(self, node: ast.expr | None) -> None:
-        if node is None:
-            self.out.append("return")
-            return
-        value = self._value(node)
+        value = None if node is None else self._value(node)
         if isinstance(value, _RowPart):
             value = _Compound(tuple(self._unpacked(value)))
-        if self.result is None:
+        if self.result is None and value is not None:
             self.result = value
             if isinstance(value, _Compound):
                 self.program.named(f"{self.name}_result", self.program.row)
@@ -318,7 +356,7 @@ class _FunctionWriter:
         if isinstance(self.result, _Scalar) and isinstance(value, _Scalar):
             self.out.append(f"return {_as(value, self.result.kind)}")
             return
-        for i, each in enumerate(_leaves(value)):
+        for i, each in enumerate([] if value is None else _leaves(value)):
             self._write(_sum(f"{self.name}_result".upper(), str(i)), each)
         self.out.append("return")
 
@@ -338,7 +376,7 @@ class _FunctionWriter:
                 for target in targets:
                     self._bind(target, value)
 
-    def _before(self, value: _Value, changed: set[str]) -> _Value:
+    def _before(self, value: _Value, changed: set[str]) -> Any:
         """A value that stays when some names change."""
         return _mapped(
             value,
@@ -356,7 +394,8 @@ class _FunctionWriter:
                     self._bind(each, part)
             case _:
                 written = self._place(target)
-                assert isinstance(written, _RowPart)
+                if not isinstance(written, _RowPart) or isinstance(value, _RowPart):
+                    raise self._refused(target)
                 if written.layout.names == COMPLEX:
                     value = _mapped(self._complex(value), self._simple)
                 for i, leaf in enumerate(_leaves(value)):
@@ -371,16 +410,12 @@ class _FunctionWriter:
                     raise ValueError(f"{self.name}: {name} is a whole number first")
                 self.out.append(f"{name} = {_as(value, kind)}")
                 return _Scalar(name, kind)
-            case _RowPart(at=at):
-                at = self._stored(_Scalar(at, WHOLE)).text if "[" in at else at
-                return _RowPart(value.row, value.layout, at)
-        labels = {label for label, _ in _labelled(name, value)}
+            case _RowPart(row=row, layout=layout, at=at):
+                return _RowPart(row, layout, self._stored(_Scalar(at, WHOLE)).text if "[" in at else at)
+        labels = {label for label, _ in value.labelled(name)}
         before = previous.values if isinstance(previous, _Compound) else (None,) * len(value.values)
         values = [self._before(each, labels) if i else each for i, each in enumerate(value.values)]
-        parts = (
-            self._local(label, each, old)
-            for (label, _), each, old in zip(_labelled(name, value), values, before, strict=True)
-        )
+        parts = map(self._local, (label for label, _ in value.labelled(name)), values, before)
         return _Compound(tuple(parts), value.names)
 
     def _write(self, at: str, value: _Scalar) -> None:
@@ -400,7 +435,7 @@ class _FunctionWriter:
 
     # Expressions.
 
-    def _value(self, node: ast.expr) -> _Value:
+    def _value(self, node: ast.expr) -> Any:
         match node:
             case ast.Constant(value=complex() as value):
                 return _Compound((_constant(value.real), _constant(value.imag)), COMPLEX)
@@ -415,8 +450,7 @@ class _FunctionWriter:
             case ast.Attribute() | ast.Subscript():
                 return self._read(self._place(node))
             case ast.Call():
-                called: _Value = self._called(node)
-                return called
+                return self._called(node)
             case ast.IfExp(test=test, body=body, orelse=orelse):
                 self.temporaries += 1
                 chosen = ast.Name(f"t{self.temporaries}")
@@ -435,25 +469,31 @@ class _FunctionWriter:
                 return self._compared(left, signs, others)
         raise self._refused(node)
 
+    def _whole(self, node: ast.expr) -> str:
+        value: _Scalar = self._value(node)
+        if value.kind != WHOLE:
+            raise self._refused(node)
+        return value.text
+
+    def _truth(self, node: ast.expr) -> str:
+        return _as(self._value(node), TRUTH)
+
     def _global(self, name: str) -> _Value:
-        value = self.function.__globals__[name]
+        value, program = self.function.__globals__[name], self.program
         if isinstance(value, bool | int | float):
-            return _Scalar(self.program.named(name, value), _constant(value).kind)
+            return _Scalar(program.named(name, value), _constant(value).kind)
         assert isinstance(value, tuple | np.ndarray), name
-        at = self.program.constants.setdefault(
-            name.strip("_"), self.program.settings + len(self.program.tables)
-        )
-        if at == self.program.settings + len(self.program.tables):
-            self.program.tables += numbers_of(value)
-        return _RowPart("c", Layout.of(value), name.strip("_"))
+        label, end = name.strip("_"), program.settings + len(program.tables)
+        if program.constants.setdefault(label, end) == end:
+            program.tables += numbers_of(value)
+        return _RowPart("c", Layout.of(value), label)
 
     def _place(self, node: ast.expr) -> _Value:
         """A part of a row or of a tuple."""
         match node:
             case ast.Attribute(value=owner, attr=name):
                 record = self._value(owner)
-                if not isinstance(record, _RowPart):
-                    assert isinstance(record, _Compound)
+                if isinstance(record, _Compound):
                     return record.values[record.names.index(name)]
                 layout = record.layout
                 if name == "size":
@@ -468,10 +508,11 @@ class _FunctionWriter:
             case ast.Subscript(value=owner, slice=index):
                 series, at = self._value(owner), self._whole(index)
                 if isinstance(series, _RowPart):
-                    size = series.layout.parts[0].size
-                    at = str(len(series.layout.parts) - 1) if at == "(-1)" else at
-                    at = str(size * int(at)) if at.isdigit() else at if size == 1 else f"{size} * ({at})"
-                    return _RowPart(series.row, series.layout.parts[0], _sum(series.at, at))
+                    part, last = series.layout.parts[0], len(series.layout.parts) - 1
+                    at = str(last) if at == "(-1)" else at
+                    at = str(part.size * int(at)) if at.isdigit() else at
+                    at = at if at.isdigit() or part.size == 1 else f"{part.size} * ({at})"
+                    return _RowPart(series.row, part, _sum(series.at, at))
                 if isinstance(series, _Compound) and at.isdigit():
                     return series.values[int(at)]
                 raise _Varying
@@ -486,22 +527,21 @@ class _FunctionWriter:
         kind, text = value.layout.kind, f"{value.row}[{value.at}]"
         return _Scalar({NUMBER: text, WHOLE: f"int({text})", TRUTH: f"({text} != 0.0)"}[kind], kind)
 
-    def _unpacked(self, value: _Value) -> list[_Value]:
+    def _unpacked(self, value: Any) -> list[_Value]:
         if isinstance(value, _Compound):
             return list(value.values)
-        assert isinstance(value, _RowPart)
-        starts = map(value.layout.start, range(len(value.layout.parts)))
-        places = [_sum(value.at, str(start)) for start in starts]
-        parts = zip(value.layout.parts, places, strict=True)
-        return [self._read(_RowPart(value.row, part, at)) for part, at in parts]
+        layout = value.layout
+        return [
+            self._read(_RowPart(value.row, part, _sum(value.at, str(layout.start(i)))))
+            for i, part in enumerate(layout.parts)
+        ]
 
-    def _complex(self, value: _Value) -> _Compound:
+    def _complex(self, value: Any) -> Any:
         if isinstance(value, _Scalar):
             return _Compound((_Scalar(_as(value, NUMBER), NUMBER), _constant(0.0)), COMPLEX)
-        assert isinstance(value, _Compound)
         return value
 
-    def _operation(self, operator: ast.operator, left: _Value, right: _Value) -> _Value:
+    def _operation(self, operator: ast.operator, left: Any, right: Any) -> Any:
         """Arithmetic, of complex numbers in their parts."""
         of = self._of_numbers
         if isinstance(left, _Scalar) and isinstance(right, _Scalar):
@@ -523,7 +563,7 @@ class _FunctionWriter:
         real = of(over, of(plus, of(times, a, x), of(times, b, y)), square)
         return _Compound((real, of(over, of(minus, of(times, b, x), of(times, a, y)), square)), COMPLEX)
 
-    def _of_numbers(self, operator: ast.operator, left: _Scalar, right: _Scalar) -> _Scalar:
+    def _of_numbers(self, operator: ast.operator, left: _Scalar, right: _Scalar) -> Any:
         if isinstance(operator, ast.Pow):
             assert right.text == "2"
             left = right = self._simple(left)
@@ -532,26 +572,13 @@ class _FunctionWriter:
         kind = WHOLE if of_whole else NUMBER
         a, b = _as(left, kind), _as(right, kind)
         if isinstance(operator, ast.Mod):
-            if not of_whole:
-                rest: _Scalar = self._user(host_math.modulo, [_Scalar(a, kind), _Scalar(b, kind)])
-                return rest
-            return _Scalar(f"({a} - {a} // {b} * {b})", kind)
+            if of_whole:
+                return _Scalar(f"({a} - {a} // {b} * {b})", kind)
+            return self._user(modulo, [_Scalar(a, kind), _Scalar(b, kind)])
         text = f"({a} {_SIGNS[type(operator)]} {b})"
         return _Scalar(str(eval(text)) if of_whole and a.isdigit() and b.isdigit() else text, kind)
 
-    def _whole(self, node: ast.expr) -> str:
-        value = self._value(node)
-        assert isinstance(value, _Scalar)
-        if value.kind != WHOLE:
-            raise self._refused(node)
-        return value.text
-
-    def _truth(self, node: ast.expr) -> str:
-        value = self._value(node)
-        assert isinstance(value, _Scalar)
-        return _as(value, TRUTH)
-
-    def _joined(self, join: ast.boolop, first: ast.expr, others: list[ast.expr]) -> _Value:
+    def _joined(self, join: ast.boolop, first: ast.expr, others: list[ast.expr]) -> Any:
         """All or any of some truths; one that calls a function is not asked for without need."""
         rest = others[0] if len(others) == 1 else ast.BoolOp(join, others)
         if any(isinstance(each, ast.Call) for each in ast.walk(rest)):
@@ -560,7 +587,7 @@ class _FunctionWriter:
         sign = " and " if isinstance(join, ast.And) else " or "
         return _Scalar(f"({sign.join(map(self._truth, (first, *others)))})", TRUTH)
 
-    def _compared(self, left: ast.expr, signs: Sequence[ast.cmpop], others: Sequence[ast.expr]) -> _Value:
+    def _compared(self, left: ast.expr, signs: Sequence[ast.cmpop], others: Sequence[ast.expr]) -> Any:
         match signs, others:
             case [ast.In()], [ast.Tuple(elts=elements)]:
                 equal: list[ast.expr] = [ast.Compare(left, [ast.Eq()], [each]) for each in elements]
@@ -601,7 +628,7 @@ class _FunctionWriter:
             case "abs":
                 return _Scalar(f"abs({_as(values[0], NUMBER)})", NUMBER)
             case "min" | "max":
-                extreme, result = host_math.smaller if name == "min" else host_math.larger, values[0]
+                extreme, result = smaller if name == "min" else larger, values[0]
                 for other in values[1:]:
                     both = [_Scalar(_as(each, NUMBER), NUMBER) for each in (result, other)]
                     result = self._user(extreme, both)
@@ -622,7 +649,7 @@ class _FunctionWriter:
         if name == "isfinite":
             x = self._simple(numbers[0]).text
             return _Scalar(f"({x} - {x} == 0.0)", TRUTH)
-        return self._user(getattr(host_math, f"host_{name}"), numbers)
+        return self._user(globals()[f"host_{name}"], numbers)
 
     def _user(self, function: Callable[..., Any], values: Sequence[_Value]) -> Any:
         """Call of a function of the program; several results are read from their places."""
@@ -636,20 +663,13 @@ class _FunctionWriter:
         places = (_sum(f"{flat.name}_result".upper(), str(i)) for i in range(self.program.row))
 
         def taken(each: _Scalar) -> _Scalar:
-            value = self._read(_RowPart("w", Layout(1, each.kind), next(places)))
-            assert isinstance(value, _Scalar)
+            value: Any = self._read(_RowPart("w", Layout(1, each.kind), next(places)))
             return self._stored(value)
 
-        return None if flat.result is None else _mapped(flat.result, taken)
+        return _mapped(flat.result, taken)
 
     def _refused(self, node: ast.stmt | ast.expr) -> ValueError:
         return ValueError(f"{self.name}: not of the subset that is written out: {ast.unparse(node)}")
-
-
-def _labelled(name: str, value: _Compound) -> Iterator[tuple[str, _Value]]:
-    """Parts with names of local variables."""
-    labels = value.names or map(str, range(len(value.values)))
-    return ((f"{name}_{label}", each) for label, each in zip(labels, value.values, strict=True))
 
 
 def _local(name: str) -> str:
@@ -667,3 +687,62 @@ def _needed(lines: list[str]) -> tuple[list[str], set[str]]:
 
 def _indented(lines: Sequence[str]) -> list[str]:
     return [f"    {line}" for line in lines]
+
+
+# Functions that not every language has, from those that all have; written out as the program's own.
+
+HALF_TURN: Final = math.pi
+
+
+def larger(a: float, b: float) -> float:
+    """The larger of two numbers."""
+    return b if a < b else a
+
+
+def smaller(a: float, b: float) -> float:
+    """The smaller of two numbers."""
+    return b if b < a else a
+
+
+def modulo(a: float, b: float) -> float:
+    """Remainder of a within 0 and b, b excluded."""
+    rest = a - float(int(a / b)) * b
+    if rest < 0:
+        rest = rest + b
+    return 0.0 if rest >= b else rest
+
+
+def host_hypot(x: float, y: float) -> float:
+    """Length of a vector."""
+    return sqrt(x * x + y * y)
+
+
+def host_copysign(size: float, sign: float) -> float:
+    """A size with the sign of another number, plus for a zero."""
+    return -abs(size) if sign < 0 else abs(size)
+
+
+def host_atan2(y: float, x: float) -> float:
+    """Angle of a vector, within -pi and pi, the former excluded."""
+    length = sqrt(x * x + y * y)
+    if x > 0:
+        return 2 * atan(y / (length + x))
+    if y != 0:
+        return 2 * atan((length - x) / y)
+    return HALF_TURN if x < 0 else 0.0
+
+
+def host_expm1(x: float) -> float:
+    """exp(x) - 1, exact near zero too. Source: Kahan's formula."""
+    power = exp(x)
+    if power == 1:
+        return x
+    if power - 1 == -1:
+        return -1.0
+    return (power - 1) * x / log(power)
+
+
+def host_ceil(x: float) -> int:
+    """Least whole number that is not less."""
+    below = int(x)
+    return below + 1 if x > below else below

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import math
+import re
+from collections.abc import Iterator, Mapping
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass import friction_filter, imbalance_filter, memory
 from ringbalance.controller.eccentric_mass.memory import MEMORY, EccentricMeasurement
 from ringbalance.controller.eccentric_mass.plant import (
     LOCKED,
@@ -21,9 +26,8 @@ from ringbalance.controller.eccentric_mass.run import SENSOR_NOISES, Machine, me
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.step import begin_strategy, strategy_step
-from ringbalance.export.blocks import Block, variables_of
-from ringbalance.export.flatten import Flattening
-from ringbalance.export.rows import Layout, numbers_of
+from ringbalance.export.blocks import Block, declared, variables_of
+from ringbalance.export.flatten import COMPLEX, Flattening, Layout, numbers_of, parts_of
 from ringbalance.scene.arrays import Record
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.platform.compiled import in_place
@@ -144,6 +148,12 @@ def _block(
     def index_of(path: str, part: int | None) -> int:
         return layout.index(path.replace("#", str(part)))
 
+    texts = {}
+    for each in (*declared()["measured"], *declared()[kind]):
+        text = each["description"].replace("#", " and ".join(each.get("letters", "")))
+        unit = each["range"].get("unit")
+        texts[each["place"].removesuffix(".#")] = f"{text}, {unit}" if unit else text
+    legend = [f"c{line}" for line in _places(settings, texts)] + [f"w{line}" for line in _places(row, texts)]
     measured = variables_of("measured", index_of, inputs=kind == "strategy")
     others = variables_of(kind, index_of)
     # Of one type inputs come first.
@@ -158,11 +168,44 @@ def _block(
         start=(*start, *(0.0,) * (flat.row - len(start))),
         modules=(),
         steps=entry.__name__,
-        timed=True,
         variables=tuple(variables),
         period=scene.sensor.step,
         flat=flat.source,
+        legend=("Indices, SI; a matrix row by row, a complex number by its two parts.", *legend),
     )
+
+
+def _places(
+    value: Any, texts: Mapping[str, str], path: str = "", at: int = 0, text: str = ""
+) -> Iterator[str]:
+    """Indices, path and meaning of each number or array in a row. Args: `texts`: meanings by path."""
+    names, parts = parts_of(value) if Layout.of(value).parts else ((), [])
+    if names in ((), COMPLEX) and not any(isinstance(each, tuple | np.void) for each in parts):
+        end, text = at + Layout.of(value).size - 1, texts.get(path, text)
+        yield f"[{at}{f'..{end}' * (end > at)}] {path}{f': {text}' * bool(text)}"
+        return
+    of_fields = _texts_of(value) if names else {}
+    for name, part in zip(names or map(str, range(len(parts))), parts, strict=True):
+        yield from _places(part, texts, f"{path}.{name}".lstrip("."), at, of_fields.get(name, ""))
+        at += Layout.of(part).size
+
+
+def _texts_of(record: Any) -> dict[str, str]:
+    """Meanings of fields: docstrings in a named tuple, comments in the type of an array's element."""
+    if not isinstance(record, np.void):
+        field = re.compile(r'^    (\w+): [^\n]*\n    """(.*?)\.?(?:"""|\n\n)', re.MULTILINE | re.DOTALL)
+        texts = field.findall(inspect.getsource(type(record)))
+        return {name: " ".join(text.split()) for name, text in texts}
+    for module in (memory, friction_filter, imbalance_filter):
+        source, first = inspect.getsource(module), 0
+        for node in ast.parse(source).body:
+            match node:
+                case ast.AnnAssign(target=ast.Name(id=name)) if isinstance(vars(module)[name], np.dtype):
+                    lines = source.split("\n")[first : node.end_lineno]
+                    if vars(module)[name] == record.dtype:
+                        return dict(re.findall(r'"(\w+)".*?# (.*)', "\n".join(lines)))
+                    first = node.end_lineno or 0
+    return {}
 
 
 BLOCKS: Final = {"controller": strategy_block, "plant": plant_block}

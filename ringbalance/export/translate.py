@@ -1,7 +1,8 @@
 """Write functions of numbers in C99, JavaScript and structured text (IEC 61131-3), from their syntax trees.
 
 Only what all languages evaluate alike is accepted: +, -, *, /, sqrt, comparisons, `if`, `while`, whole
-numbers that divide without remainder or towards zero, and rows of numbers.
+numbers that divide without remainder or towards zero, and rows of numbers.  `for` over a range, `+=`, several
+targets and names of modules are reduced to these first.
 """
 
 from __future__ import annotations
@@ -19,8 +20,14 @@ LAW, CELLS, PIECES, LEVELS, QUERY = "Law", "Cells", "Pieces", "Levels", "Query"
 PER_PIECE: Final = 8  # numbers in a row of `Pieces` or `Levels`
 MATHS: Final = ("sqrt", "sin", "cos", "exp", "log", "atan", "acos")
 """Functions of one number that all languages have; only the first gives the same bits in each."""
-_BINARY: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/"}
+_ARITHMETIC: Final = ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv
+BINARY: Final[Mapping[type, str]] = dict(zip(_ARITHMETIC, "+-*//", strict=True))
 _NOT_OF: Final = {NUMBER: ast.FloorDiv, WHOLE: ast.Div}
+_SIGNED: Final = (
+    *(ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq),
+    *(ast.And, ast.Or, ast.Not),
+)
+"""Comparisons and connectives, in the order of a language's signs."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +104,7 @@ class Source:
                 docstring = ast.get_docstring(node) or ""
                 # Decorators serve only the program's own compiled code.
                 node.decorator_list = []
+                ast.fix_missing_locations(_Reduction().visit(node))
                 arguments = {
                     each.arg: ast.unparse(each.annotation or ast.Constant("?")) for each in node.args.args
                 }
@@ -119,44 +127,77 @@ def _pairs(node: ast.Assign) -> Iterator[tuple[ast.Name, ast.expr]]:
                 yield name, value
 
 
+class _Reduction(ast.NodeTransformer):
+    """Reduce `for`, `+=`, several targets and `module.name` to what all languages have; leave the rest."""
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        return ast.Name(node.attr)
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
+        return self.generic_visit(ast.Assign([node.target], ast.BinOp(node.target, node.op, node.value)))
+
+    def visit_For(self, node: ast.For) -> list[ast.AST] | ast.AST:
+        match node:
+            case ast.For(ast.Name() as index, ast.Call(func=ast.Name(id="range"), args=ends), orelse=[]):
+                first, last = (ast.Constant(0), *ends)[-2:]
+                increment = ast.Assign([index], ast.BinOp(index, ast.Add(), ast.Constant(1)))
+                loop = ast.While(ast.Compare(index, [ast.Lt()], [last]), [*node.body, increment], [])
+                return [self.generic_visit(ast.Assign([index], first)), self.generic_visit(loop)]
+        return node
+
+    def visit_Assign(self, node: ast.Assign) -> list[ast.AST] | ast.AST:
+        pairs = [(target, node.value) for target in node.targets]
+        match node:
+            case ast.Assign(targets=[ast.Tuple(elts=targets)], value=ast.Tuple(elts=values)):
+                names = {each.id for each in targets[:-1] if isinstance(each, ast.Name)}
+                read = {each.id for value in values for each in ast.walk(value) if isinstance(each, ast.Name)}
+                if len(names) < len(targets) - 1 or names & read:
+                    return node
+                pairs = list(zip(targets, values, strict=True))
+            case ast.Assign(targets=[_, _, *_], value=value) if not isinstance(value, ast.Constant):
+                return node
+        return [self.generic_visit(ast.Assign([target], value)) for target, value in pairs]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Language:
-    """Syntax of one language."""
+    """Syntax of one language; where it is not given, that of C99."""
 
     types: Mapping[str, str]
     """Format of a declared name."""
     operators: Mapping[type, str]
     """Signs of comparisons and of `and`, `or`, `not`."""
-    to_whole: str
-    to_number: str
-    whole_quotient: str
-    """Format of the quotient of two whole numbers, from dividend and divisor."""
     maths: Mapping[str, str]
     """Formats of functions of one number: of Python's `math`, and `abs`."""
-    truths: tuple[str, str]
-    """False and true."""
-    variable: str
-    """Format of a variable's name."""
-    function: str
-    constants: bool
-    """True if constants are written by name."""
-    assign: str
-    open_if: str
-    else_if: str
-    otherwise: str
-    close_if: str
-    open_while: str
-    close_while: str
-    leave: str
-    """Statement that ends a loop."""
-    returned: Sequence[str]
-    """Lines that end a function, from its name and its result."""
-    ended: str
-    """Line that ends a function without a result."""
     element: Mapping[str, str]
     """Format of an element of an array, by type of the array, from its name and indices."""
+    to_whole: str = "(int)({})"
+    to_number: str = "(double)({})"
+    whole_quotient: str = "{} / {}"
+    """Format of the quotient of two whole numbers, from dividend and divisor."""
+    truths: tuple[str, str] = ("0", "1")
+    """False and true."""
+    variable: str = "{}"
+    """Format of a variable's name."""
+    function: str = "{}"
+    constants: bool = True
+    """True if constants are written by name."""
+    assign: str = "{} = {};"
+    open_if: str = "if ({}) {{"
+    else_if: str = "}} else if ({}) {{"
+    otherwise: str = "} else {"
+    close_if: str = "}"
+    open_while: str = "while ({}) {{"
+    close_while: str = "}"
+    leave: str = "break;"
+    """Statement that ends a loop."""
+    returned: Sequence[str] = ("return {1};",)
+    """Lines that end a function, from its name and its result."""
+    ended: str = "return;"
+    """Line that ends a function without a result."""
 
 
+_ROW_ELEMENTS: Final = dict.fromkeys((LAW, QUERY, CELLS), "{}[{}]")
 C99: Final = Language(
     types={
         NUMBER: "double {}",
@@ -169,42 +210,9 @@ C99: Final = Language(
         LEVELS: f"const double (*{{}})[{PER_PIECE}]",
         QUERY: "double *{}",
     },
-    operators={
-        ast.Lt: "<",
-        ast.LtE: "<=",
-        ast.Gt: ">",
-        ast.GtE: ">=",
-        ast.Eq: "==",
-        ast.NotEq: "!=",
-        ast.And: "&&",
-        ast.Or: "||",
-        ast.Not: "!",
-    },
-    to_whole="(int)({})",
-    to_number="(double)({})",
-    whole_quotient="{} / {}",
+    operators=dict(zip(_SIGNED, ("<", "<=", ">", ">=", "==", "!=", "&&", "||", "!"), strict=True)),
     maths={"abs": "fabs({})"} | {name: f"{name}({{}})" for name in MATHS},
-    truths=("0", "1"),
-    variable="{}",
-    function="{}",
-    constants=True,
-    assign="{} = {};",
-    open_if="if ({}) {{",
-    else_if="}} else if ({}) {{",
-    otherwise="} else {",
-    close_if="}",
-    open_while="while ({}) {{",
-    close_while="}",
-    leave="break;",
-    returned=("return {1};",),
-    ended="return;",
-    element={
-        LAW: "{}[{}]",
-        QUERY: "{}[{}]",
-        CELLS: "{}[{}]",
-        PIECES: "(double){}[{}][{}]",
-        LEVELS: "{}[{}][{}]",
-    },
+    element=_ROW_ELEMENTS | {PIECES: "(double){}[{}][{}]", LEVELS: "{}[{}][{}]"},
 )
 JAVASCRIPT: Final = replace(
     C99,
@@ -227,13 +235,7 @@ JAVASCRIPT: Final = replace(
     maths={name: f"Math.{name}({{}})" for name in (*MATHS, "abs")},
     truths=("false", "true"),
     # Rows of a table follow one another in one array.
-    element={
-        LAW: "{}[{}]",
-        QUERY: "{}[{}]",
-        CELLS: "{}[{}]",
-        PIECES: f"{{}}[{PER_PIECE} * ({{}}) + {{}}]",
-        LEVELS: f"{{}}[{PER_PIECE} * ({{}}) + {{}}]",
-    },
+    element=_ROW_ELEMENTS | dict.fromkeys((PIECES, LEVELS), f"{{}}[{PER_PIECE} * ({{}}) + {{}}]"),
 )
 
 
@@ -241,20 +243,9 @@ def structured_text(prefix: str) -> Language:
     """Structured text, whose names do not distinguish cases and whose functions share one space."""
     return Language(
         types={NUMBER: "{} : LREAL", WHOLE: "{} : DINT", TRUTH: "{} : BOOL", NOTHING: "{} : BOOL"},
-        operators={
-            ast.Lt: "<",
-            ast.LtE: "<=",
-            ast.Gt: ">",
-            ast.GtE: ">=",
-            ast.Eq: "=",
-            ast.NotEq: "<>",
-            ast.And: "AND",
-            ast.Or: "OR",
-            ast.Not: "NOT ",
-        },
+        operators=dict(zip(_SIGNED, ("<", "<=", ">", ">=", "=", "<>", "AND", "OR", "NOT "), strict=True)),
         to_whole="TRUNC({})",
         to_number="DINT_TO_LREAL({})",
-        whole_quotient="{} / {}",
         maths={name: ("LN" if name == "log" else name.upper()) + "({})" for name in (*MATHS, "abs")},
         truths=("FALSE", "TRUE"),
         variable="v_{}",
@@ -270,9 +261,8 @@ def structured_text(prefix: str) -> Language:
         leave="EXIT;",
         returned=(f"{prefix}_{{0}} := {{1}};", "RETURN;"),
         ended="RETURN;",
-        element={
-            LAW: "{}[{}]",
-            QUERY: "{}[{}]",
+        element=_ROW_ELEMENTS
+        | {
             CELLS: "USINT_TO_DINT({}[{}])",
             PIECES: "REAL_TO_LREAL({}[{}, {}])",
             LEVELS: "{}[{}, {}]",
@@ -382,7 +372,7 @@ class Writer:
                 return f"-{self._operand(operand, kind)}", kind
             case ast.UnaryOp(op=ast.Not() as no, operand=operand):
                 return f"{signs[type(no)]}({self._typed(operand, TRUTH)})", TRUTH
-            case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _BINARY:
+            case ast.BinOp(left=left, op=operator, right=right) if type(operator) in BINARY:
                 kind = self._expression(left)[1]
                 if isinstance(operator, _NOT_OF.get(kind, ast.operator)):
                     raise self._refused(left)
@@ -390,7 +380,7 @@ class Writer:
                 operands = self._operand(left, kind), self._operand(right, kind)
                 if kind == WHOLE and isinstance(operator, ast.FloorDiv):
                     return self.language.whole_quotient.format(*operands), kind
-                return f" {_BINARY[type(operator)]} ".join(operands), kind
+                return f" {BINARY[type(operator)]} ".join(operands), kind
             case ast.Compare(left=left, ops=[comparison], comparators=[right]):
                 kind = self._expression(left)[1]
                 sign = signs[type(comparison)]

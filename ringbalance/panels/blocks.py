@@ -6,11 +6,11 @@ from types import ModuleType
 from typing import Final
 
 from ringbalance.controller.algorithms import law_steps, target_steps, trial_steps, valve_steps
-from ringbalance.export import chamber, disc, law_based
+from ringbalance.export import disc, law_based
 from ringbalance.export.translate import Source, js_functions
 from ringbalance.reduced_model.pieces import point, query
 
-_LAW: Final = (point, query, chamber, disc)
+_LAW: Final = (point, query, disc)
 _SOURCES: Final[dict[str, tuple[tuple[ModuleType, ...], dict[str, str]]]] = {
     "ring": (
         (*_LAW, valve_steps, law_steps, law_based),

@@ -17,9 +17,9 @@ from ringbalance.controller.eccentric_mass.run import Machine
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE
+from ringbalance.export.flatten import Layout, numbers_of
 from ringbalance.export.hosts import js_files
 from ringbalance.export.masses import PLANT, plant_block, strategy_block
-from ringbalance.export.rows import Layout, numbers_of
 from ringbalance.panels.document import MASS_MODULES, document_of
 from ringbalance.scene.origins import value_at
 

@@ -18,8 +18,8 @@ import ringbalance as rb
 from ringbalance.controller.simulation import Simulation
 from ringbalance.export import disc, law_based
 from ringbalance.export.blocks import Block, controller_block, disc_block
+from ringbalance.export.fmu import reference_files
 from ringbalance.export.hosts import c_files, python_files, st_files
-from ringbalance.export.reference import reference_files
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.pieces.point import BLOCK
 from ringbalance.scene.arrays import FloatArray

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from law_queries import answers, queries
 
-from ringbalance.export import chamber, compact
+from ringbalance.export import compact
 from ringbalance.export.compact import MAX_BYTES, TOLERANCE, CompactLaw, compact_law
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.calibration import chamber_and_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces import point, query
 from ringbalance.scene.fitted import Fitted, FittedQuantity
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
@@ -48,11 +48,11 @@ def test_a_chamber_has_its_surface_and_its_moment(laws: Both, paper_scene: Scene
     law, compact = laws
     fill = np.linspace(0.0, law.max_fill_ratio, 57)
     tables = compact.constants, compact.tables.cells, compact.tables.pieces
-    moment = [chamber.moment(*tables, each) for each in fill.tolist()]
+    moment = [query.moment(*tables, each) for each in fill.tolist()]
     right = law.moment.chamber_moment(fill)
     assert moment == pytest.approx(right, abs=2e-5 * float(np.max(np.abs(right))))
     if compact.scene == paper_scene.file:
-        radius = [chamber.surface_radius(*tables, each) for each in fill.tolist()]
+        radius = [query.surface_radius(*tables, each) for each in fill.tolist()]
         assert radius == pytest.approx(surface_radius(disc=paper_scene.disc, fill_ratio=fill), rel=1e-5)
 
 
@@ -77,7 +77,7 @@ def test_a_moment_has_the_largest_half_width_of_its_piece(laws: Both) -> None:
     law, made = laws
     fill = np.linspace(0.0, law.max_fill_ratio, 57)
     tables = made.constants, made.tables.cells, made.tables.pieces
-    widths = np.array([chamber.moment_uncertainty(*tables, each) for each in fill.tolist()])
+    widths = np.array([query.moment_uncertainty(*tables, each) for each in fill.tolist()])
     right = law.moment.half_width(fill)
     assert np.all(widths >= (1 - 1e-6) * right)
     largest = np.max(law.moment.half_width(np.linspace(0.0, law.max_fill_ratio, 641)))

@@ -12,8 +12,7 @@ from law_queries import answers, queries
 
 from ringbalance.export.blocks import law_block
 from ringbalance.export.compact import CompactLaw
-from ringbalance.export.grid import COLUMNS, csv_files
-from ringbalance.export.hosts import identifier, python_files
+from ringbalance.export.hosts import COLUMNS, csv_files, identifier, python_files
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 
 Both = tuple[CalibratedLaw, CompactLaw]

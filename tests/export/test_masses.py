@@ -24,11 +24,12 @@ from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import Machine, measure, sensor_noise
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.export.blocks import Block
+from ringbalance.export.flatten import Flattening, Layout
 from ringbalance.export.fmu import fmu_bytes
-from ringbalance.export.hosts import c_files, js_files, python_files
+from ringbalance.export.hosts import c_files, js_files, python_files, st_files
 from ringbalance.export.libraries import Version
 from ringbalance.export.masses import PLANT, plant_block, strategy_block
-from ringbalance.export.rows import Layout
+from ringbalance.export.translate import python_functions
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.changes import file_text
 
@@ -128,6 +129,52 @@ def test_what_a_run_measured_gives_its_voltages(tmp_path: Path, name: str) -> No
         arms = told[:, [columns["friction_arm_1"], columns["friction_arm_2"]]]
         assert np.allclose(arms, history["friction_arm"][: len(told)], rtol=1e-11, atol=0)
         assert np.ptp(told[:, voltages]) > 0
+
+
+def test_the_text_for_controllers_says_what_stands_where() -> None:
+    """Each index of the settings and of the memory once, with its meaning and unit."""
+    block = strategy_block(scene_of("washing_machine"))
+    text, c = st_files(block, "ctrl")["ctrl.st"], c_files(block, "ctrl")["ctrl.c"]
+    for row in "cw":
+        ranges = re.findall(rf"^ +{row}\[(\d+)(?:\.\.(\d+))?\] ", text, re.MULTILINE)
+        ends = [(int(a), int(b or a)) for a, b in ranges]
+        assert [a for a, _ in ends] == [0, *(b + 1 for _, b in ends[:-1])]
+        assert ends[-1][1] <= (len(block.constants) if row == "c" else len(block.start)) - 1
+    for line in (
+        "sample: number of samples taken",
+        "law.torque_per_volt: B_add, N m/V",
+        "memory.friction.1.arm: friction arm mu, m",
+        "memory.voltage: for the motor of mass 1 and 2, held to the next sample, V",
+    ):
+        assert line in text
+        assert line in c
+    assert text.count("(*") == text.count("*)")
+    assert "friction arm mu" not in js_files(block, "ctrl")["ctrl.mjs"]
+
+
+_LEAF = np.dtype([("held", np.int64), ("vector", np.complex128)])
+_NESTED = np.dtype([("first", np.float64), ("pair", np.dtype([("leaf", _LEAF)]), (2,)), ("leaf", _LEAF)])
+
+
+def _set_leaf(leaf: Any, value: complex) -> None:
+    leaf.vector = leaf.vector + value
+    leaf.held = leaf.held + 1
+
+
+def _set_all(settings: Any, host: Any, time: float) -> None:
+    for i in range(2):
+        _set_leaf(host.pair[i].leaf, settings[0] * time * (1 + i))
+    _set_leaf(host.leaf, 1j)
+    host.first = host.pair[1].leaf.vector.imag
+
+
+def test_records_within_records_are_places_of_any_depth() -> None:
+    flat, row = Flattening.of(_set_all, (2j,), np.zeros(1, dtype=_NESTED)[0]), [0.0] * 10
+    names: dict[str, Any] = {"Law": list, "Query": list}
+    exec(python_functions(flat.source), names)
+    for _ in range(2):
+        names["do_set_all"]([0.0, 2.0], row, 0.5)
+    assert row == [4.0, 2.0, 0.0, 2.0, 2.0, 0.0, 4.0, 2.0, 0.0, 2.0]
 
 
 def test_a_controller_begins_with_the_masses_where_they_are() -> None:

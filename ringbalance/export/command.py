@@ -16,7 +16,7 @@ from ringbalance.reduced_model.calibration import chamber_and_law
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.terminal import activity, print_message, results_console
 from ringbalance.scene.registry import imported
@@ -49,11 +49,13 @@ def export(options: SimpleNamespace) -> int:
     kind = options.block or kinds[0]
     if kind not in kinds:
         raise _refusal("--block", kind, f"a scene of {scene.balancer} has none", " or ".join(kinds))
-    if cross and scene.balancer == "eccentric_mass":
+    masses = scene.balancer == "eccentric_mass"
+    if masses and cross:
         problem = "blocks of eccentric masses need sin and cos of each system's own library"
-        raise _refusal(
-            "--all-systems", True, problem, "no such option, or a build from the unit's sources there"
-        )
+        allowed = "no such option, or a build from the unit's sources there"
+        raise _refusal("--all-systems", True, problem, allowed)
+    if masses and options.points is not None:
+        raise _refusal("--points", options.points, "the matrices of a loop are no grid", "none")
     if options.to == "csv" and kind != kinds[0]:
         raise _refusal("--block", kind, f"csv is a table of the {kinds[0]}", f"--block {kinds[0]}")
     called = identifier(options.name or options.scene.stem + ("" if kind == "law" else f"_{kind}"))
@@ -61,21 +63,29 @@ def export(options: SimpleNamespace) -> int:
         allowed = "lower-case letters, digits and single underscores, a letter first; no word of Python"
         raise _refusal("--name", options.name, "it names functions in every language", allowed)
     with staged(options.out) as folder:
-        compact: CompactLaw | None = None
-        if scene.balancer == "eccentric_mass":
-            texts, block = _of_masses(scene, kind, options, called)
-        else:
-            texts, block, compact = _of_ring(liquid_ring_scene(scene), kind, options, called)
-        if options.to == "fmi2" or options.to == "fmi3":
+        # The masses' blocks load the compiler.
+        block, compact = (
+            (imported("ringbalance.export.masses:BLOCKS")[kind](scene), None)
+            if masses
+            else _ring_block(liquid_ring_scene(scene), kind)
+        )
+        if options.to in ("fmi2", "fmi3"):
             with activity("export", "compiling ..."):
                 unit, runs = fmu_bytes(block, called, options.to, all_systems=cross)
                 if not runs:
                     print_message("no C compiler here: the unit holds its source alone")
             files = {f"{called}.fmu": unit}
         else:
+            writers = {"c": c_files, "st": st_files, "python": python_files, "js": js_files}
             if options.to != "csv":
-                writers = {"c": c_files, "st": st_files, "python": python_files, "js": js_files}
                 texts = writers[options.to](block, called)
+            elif compact is None:
+                loop = imported("ringbalance.controller.eccentric_mass.loop_matrices:eccentric_loop")(scene)
+                texts = {f"{called}.csv": loop.csv}
+            else:
+                pressure = max(applied_pressure(liquid_ring_scene(scene).gas), 0.0)
+                end = _GRID_END * pressure or _GRID_END_WITHOUT_PRESSURE_PA
+                texts = csv_files(compact, called, points=options.points or _GRID_POINTS, highest=end)
             files = {file: text.encode() for file, text in texts.items()}
         for file, content in files.items():
             (folder / file).write_bytes(content)
@@ -86,37 +96,16 @@ def export(options: SimpleNamespace) -> int:
     return 0
 
 
-def _of_ring(
-    scene: Scene, kind: str, options: SimpleNamespace, called: str
-) -> tuple[dict[str, str], Block, CompactLaw | None]:
-    """Table, if that is what is asked for, block, and the law that it is."""
+def _ring_block(scene: Scene, kind: str) -> tuple[Block, CompactLaw | None]:
+    """Block of a liquid ring, and the law that it is."""
     if kind == "controller" and scene.controller.kind != "law_based":
-        return {}, controller_block(scene), None
+        return controller_block(scene), None
     with activity("export", "calibrating ..."):
         law = chamber_and_law(scene)[1]
         if kind != "law":
-            return {}, (controller_block if kind == "controller" else disc_block)(scene, law), None
+            return (controller_block if kind == "controller" else disc_block)(scene, law), None
         compact = compact_law(scene=scene, law=law)
-    texts: dict[str, str] = {}
-    if options.to == "csv":
-        pressure = applied_pressure(scene.gas)
-        highest = _GRID_END * pressure if pressure > 0 else _GRID_END_WITHOUT_PRESSURE_PA
-        texts = csv_files(compact, called, points=options.points or _GRID_POINTS, highest=highest)
-    return texts, law_block(compact), compact
-
-
-def _of_masses(
-    scene: AnyScene, kind: str, options: SimpleNamespace, called: str
-) -> tuple[dict[str, str], Block]:
-    """Table of the loop's matrices, if that is what is asked for, and block."""
-    if options.points is not None:
-        raise _refusal("--points", options.points, "the matrices of a loop are no grid", "none")
-    # These load the compiler.
-    block: Block = imported("ringbalance.export.masses:BLOCKS")[kind](scene)
-    if options.to != "csv":
-        return {}, block
-    loop = imported("ringbalance.controller.eccentric_mass.loop_matrices:eccentric_loop")(scene)
-    return {f"{called}.csv": loop.csv}, block
+    return law_block(compact), compact
 
 
 def _refusal(option: str, value: object, problem: str, allowed: str) -> SceneError:

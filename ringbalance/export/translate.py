@@ -22,6 +22,7 @@ MATHS: Final = ("sqrt", "sin", "cos", "exp", "log", "atan", "acos")
 """Functions of one number that all languages have; only the first gives the same bits in each."""
 _ARITHMETIC: Final = ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv
 BINARY: Final[Mapping[type, str]] = dict(zip(_ARITHMETIC, "+-*//", strict=True))
+_UNKNOWN: Final = ast.Constant("?")
 _NOT_OF: Final = {NUMBER: ast.FloorDiv, WHOLE: ast.Div}
 _SIGNED: Final = (
     *(ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq),
@@ -91,40 +92,27 @@ class Source:
 
         Raises: ValueError: code outside the subset.
         """
-        tree = ast.parse(text)
-        constants = {
-            name.id: ast.literal_eval(value)
-            for node in tree.body
-            if isinstance(node, ast.Assign)
-            for name, value in _pairs(node)
-        }
-        functions = {}
-        for node in tree.body:
-            if isinstance(node, ast.FunctionDef):
-                docstring = ast.get_docstring(node) or ""
-                # Decorators serve only the program's own compiled code.
-                node.decorator_list = []
-                ast.fix_missing_locations(_Reduction().visit(node))
-                arguments = {
-                    each.arg: ast.unparse(each.annotation or ast.Constant("?")) for each in node.args.args
-                }
-                functions[node.name] = Function(
-                    name=node.name,
-                    summary=docstring.split("\n")[0],
-                    arguments=arguments,
-                    result=ast.unparse(node.returns or ast.Constant("?")),
-                    body=node.body[1 if docstring else 0 :],
-                    text=ast.unparse(node),
-                )
+        constants: dict[str, int | float] = {}
+        functions: dict[str, Function] = {}
+        for node in ast.parse(text).body:
+            match node:
+                case ast.Assign(targets=[ast.Tuple(elts=names)], value=ast.Tuple(elts=values)):
+                    pairs = zip(names, values, strict=True)
+                    constants |= {ast.unparse(name): ast.literal_eval(value) for name, value in pairs}
+                case ast.FunctionDef(args=ast.arguments(args=arguments)):
+                    docstring = ast.get_docstring(node) or ""
+                    # Decorators serve only the program's own compiled code.
+                    node.decorator_list = []
+                    ast.fix_missing_locations(_Reduction().visit(node))
+                    functions[node.name] = Function(
+                        name=node.name,
+                        summary=docstring.split("\n")[0],
+                        arguments={each.arg: ast.unparse(each.annotation or _UNKNOWN) for each in arguments},
+                        result=ast.unparse(node.returns or _UNKNOWN),
+                        body=node.body[1 if docstring else 0 :],
+                        text=ast.unparse(node),
+                    )
         return cls(constants=constants, functions=functions)
-
-
-def _pairs(node: ast.Assign) -> Iterator[tuple[ast.Name, ast.expr]]:
-    target = node.targets[0]
-    if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
-        for name, value in zip(target.elts, node.value.elts, strict=True):
-            if isinstance(name, ast.Name):
-                yield name, value
 
 
 class _Reduction(ast.NodeTransformer):
@@ -280,14 +268,11 @@ class Writer:
     types: dict[str, str] = field(default_factory=dict)
     """Types of arguments, and of local variables as they are met."""
 
-    def lines(self) -> list[str]:
-        """The body, one statement a line."""
+    def written(self) -> tuple[dict[str, str], list[str]]:
+        """Types of the local variables by name, and the body, one statement a line."""
         self.types.update(self.function.arguments)
-        return list(self._block(self.function.body))
-
-    def local_variables(self) -> dict[str, str]:
-        """Name to type, after `lines`."""
-        return {name: kind for name, kind in self.types.items() if name not in self.function.arguments}
+        lines = list(self._block(self.function.body))
+        return {name: kind for name, kind in self.types.items() if name not in self.function.arguments}, lines
 
     def _block(self, body: Sequence[ast.stmt]) -> Iterator[str]:
         for node in body:
@@ -457,13 +442,12 @@ def c_functions(source: Source) -> str:
         if isinstance(value, float)
     ]
     for function in source.functions.values():
-        writer = Writer(language=C99, source=source, function=function)
-        lines = writer.lines()
-        variables = [f"{C99.types[kind].format(name)};" for name, kind in writer.local_variables().items()]
-        arguments = [C99.types[kind].format(name) for name, kind in function.arguments.items()]
-        body = "".join(f"    {line}\n" for line in [*variables, *lines])
-        head = "static " + C99.types[function.result].format(f"{function.name}({', '.join(arguments)})")
-        parts.append(f"\n/* {function.summary} */\n{head}\n{{\n{body}}}\n")
+        variables, lines = Writer(language=C99, source=source, function=function).written()
+        declared = [f"{C99.types[kind].format(name)};" for name, kind in variables.items()]
+        arguments = ", ".join(C99.types[kind].format(name) for name, kind in function.arguments.items())
+        body = "".join(f"    {line}\n" for line in [*declared, *lines])
+        head = C99.types[function.result].format(f"{function.name}({arguments})")
+        parts.append(f"\n/* {function.summary} */\nstatic {head}\n{{\n{body}}}\n")
     return "".join(parts)
 
 
@@ -473,19 +457,15 @@ def js_functions(source: Source) -> str:
         f"const {name} = {value if isinstance(value, int) else number_text(value)};\n"
         for name, value in source.constants.items()
     ]
+    types = JAVASCRIPT.types
     for function in source.functions.values():
-        writer = Writer(language=JAVASCRIPT, source=source, function=function)
-        lines = writer.lines()
-        types = [
-            f" * @param {JAVASCRIPT.types[kind].format(name)}\n" for name, kind in function.arguments.items()
-        ]
-        types.append(f" * @returns {JAVASCRIPT.types[function.result].format('').strip()}\n")
-        variables = [
-            f"let {name} = {JAVASCRIPT.truths[0] if kind == TRUTH else 0};"
-            for name, kind in writer.local_variables().items()
-        ]
-        body = "".join(f"    {line}\n" for line in [*variables, *lines])
-        parts.append(f"\n/**\n * {function.summary}\n{''.join(types)} */\n")
+        variables, lines = Writer(language=JAVASCRIPT, source=source, function=function).written()
+        tags = [f" * @param {types[kind].format(name)}\n" for name, kind in function.arguments.items()]
+        tags.append(f" * @returns {types[function.result].format('').strip()}\n")
+        starts = {name: JAVASCRIPT.truths[0] if kind == TRUTH else 0 for name, kind in variables.items()}
+        declared = [f"let {name} = {start};" for name, start in starts.items()]
+        body = "".join(f"    {line}\n" for line in [*declared, *lines])
+        parts.append(f"\n/**\n * {function.summary}\n{''.join(tags)} */\n")
         parts.append(f"function {function.name}({', '.join(function.arguments)}) {{\n{body}}}\n")
     return "".join(parts)
 
@@ -495,25 +475,20 @@ def st_functions(source: Source, *, prefix: str, sizes: Mapping[str, str]) -> st
 
     Args: `prefix`: prefix of their names. `sizes`: bounds and element type of each array, by type of the row.
     """
-    language = structured_text(prefix)
-    parts = []
+    language, parts = structured_text(prefix), []
     for function in source.functions.values():
-        writer = Writer(language=language, source=source, function=function)
-        lines = writer.lines()
-        rows = {name: kind for name, kind in function.arguments.items() if kind in sizes}
+        variables, lines = Writer(language=language, source=source, function=function).written()
+        sections: dict[str, list[str]] = {"VAR_IN_OUT": [], "VAR_INPUT": [], "VAR": []}
+        for name, kind in function.arguments.items():
+            if kind in sizes:
+                sections["VAR_IN_OUT"].append(f"v_{name} : ARRAY{sizes[kind]};")
+            else:
+                sections["VAR_INPUT"].append(f"{language.types[kind].format(f'v_{name}')};")
+        sections["VAR"] = [f"{language.types[kind].format(f'v_{name}')};" for name, kind in variables.items()]
         parts.append(f"\n(* {function.summary} *)\n")
         parts.append(f"FUNCTION {language.types[function.result].format(f'{prefix}_{function.name}')}\n")
-        inputs = [
-            f"{language.types[kind].format(language.variable.format(name))};"
-            for name, kind in function.arguments.items()
-            if kind not in sizes
-        ]
-        in_out = [f"v_{name} : ARRAY{sizes[kind]};" for name, kind in rows.items()]
-        inner = [
-            f"{language.types[kind].format(f'v_{name}')};" for name, kind in writer.local_variables().items()
-        ]
-        for kind, declared in (("VAR_IN_OUT", in_out), ("VAR_INPUT", inputs), ("VAR", inner)):
+        for section, declared in sections.items():
             if declared:
-                parts.append(f"{kind}\n" + "".join(f"    {each}\n" for each in declared) + "END_VAR\n")
+                parts.append(f"{section}\n" + "".join(f"    {each}\n" for each in declared) + "END_VAR\n")
         parts.append("".join(f"{line}\n" for line in lines) + "END_FUNCTION\n")
     return "".join(parts)

@@ -90,14 +90,14 @@ class Block:
     facts: str
     """Contents and accuracy, in sentences."""
     constants: Numbers
-    tables: Tables | None
-    """Tables of its law, if it has one."""
     start: Numbers
     """The row before the first step."""
-    modules: tuple[ModuleType, ...]
     steps: str
     """Name of the function that advances by a time and updates the outputs; that of the law only updates."""
     variables: tuple[Variable, ...]
+    tables: Tables | None = None
+    """Tables of its law, if it has one."""
+    modules: tuple[ModuleType, ...] = ()
     period: float = 0.01
     """Time of a step where a host is given none, s."""
     flat: Source | None = None
@@ -173,8 +173,8 @@ def disc_block(scene: Scene, law: CalibratedLaw, *, compact: CompactLaw | None =
     """Fills and gas of all chambers in time, and the vibration of the scene's rotor.
 
     Args: `compact`: the law's compact form; None: it is made.
-    Raises: SceneError: chambers that are not symmetric, whose moment across their middle the numbers lack,
-        inputs that were fitted together, or a gas line that fills a chamber too fast for a host's steps.
+    Raises: SceneError: chambers that are not symmetric, whose moment across their middle the numbers lack, or
+        a gas line that fills a chamber too fast for a host's steps.
     """
     gas, half = scene.gas, scene.disc.chambers // 2
     terms = {FILLING: gas.conductance, LAG: gas.valve_lag}
@@ -209,9 +209,8 @@ def _disc(
 ) -> tuple[CompactLaw, list[float], list[float]]:
     """Law of a disc, the numbers of both, and its row at the start."""
     if law.moment.across is not None:
-        raise SceneError.of_file(
-            scene.file, "the chambers are asymmetric: the disc's moment would miss a part", "--block law"
-        )
+        problem = "the chambers are asymmetric: the disc's moment would miss a part"
+        raise SceneError.of_file(scene.file, problem, "--block law")
     gas, rotor, half, fill = scene.gas, scene.rotor_as_read, scene.disc.chambers // 2, scene.disc.initial_fill
     compact = compact or compact_law(scene=scene, law=law)
     dynamics = dynamics_of(scene=scene, model=BalancerModel.of(law), modelled=modelled)
@@ -271,20 +270,18 @@ def controller_block(
 
     Raises: SceneError: as `disc_block`, for the law-based one.
     """
-    chambers = scene.disc.chambers
     if scene.controller.kind == "law_based":
         if law is None:
             raise ValueError("the law-based controller needs the calibrated law")
         return _law_based_block(scene, law, compact)
-    tries = scene.controller.kind == "trial"
+    tries, chambers = scene.controller.kind == "trial", scene.disc.chambers
     steps: ModuleType = trial_steps if tries else target_steps
 
     def index_of(offset: str, chamber: int | None) -> int:
         if chamber is None:
             return int(getattr(steps, offset))
-        return (
-            int(steps.FIRST_CHAMBER) + valve_steps.PER_CHAMBER * chamber + int(getattr(valve_steps, offset))
-        )
+        first = int(steps.FIRST_CHAMBER) + valve_steps.PER_CHAMBER * chamber
+        return first + int(getattr(valve_steps, offset))
 
     return Block(
         kind="controller",
@@ -292,7 +289,6 @@ def controller_block(
         scene=scene.file,
         facts="Settings of the scene; the vibration enters by its components.",
         constants=(Trial if tries else TargetVector)(scene=scene).constants,
-        tables=None,
         start=(0.0,) * (steps.FIRST_CHAMBER + valve_steps.PER_CHAMBER * chambers),
         modules=(point, valve_steps, steps),
         steps="step",
@@ -308,13 +304,11 @@ def _law_based_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw | Non
     constants[d + disc.RESIDUAL], constants[d + disc.LONGEST] = -1.0, _LONGEST_FOLLOWED_PART_S
     loop, run = np.zeros(1, dtype=LOOP)[0], np.zeros(1, dtype=RUN)[0]
     LawBased(scene=scene, model=BalancerModel.of(law)).fill(loop, run)
+    deviations = loop[["law_deviation", "assumed_amplitude_noise", "assumed_phase_noise"]]
     constants += (
         *map(float, loop[["rest_limit", "minimum_gas_time", "maximum_gas_time", "probe", "least_fill"]]),
         abs(complex(loop["influence"])),
-        *(
-            x**2
-            for x in map(float, loop[["law_deviation", "assumed_amplitude_noise", "assumed_phase_noise"]])
-        ),
+        *(float(each) ** 2 for each in deviations),
         *loop["offset"][:chambers].tolist(),
     )
     host = law_steps.change_of(r, half)
@@ -346,9 +340,8 @@ def _law_based_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw | Non
 
 def declared() -> dict[str, Any]:
     """Variables of each kind of block, `MOST` for the largest fill ratio and `#` for a letter, and units."""
-    return tomllib.loads(
-        files("ringbalance.export").joinpath("templates/variables.toml").read_text(encoding="utf-8")
-    )
+    file = files("ringbalance.export").joinpath("templates/variables.toml")
+    return tomllib.loads(file.read_text(encoding="utf-8"))
 
 
 def variables_of(

@@ -18,9 +18,9 @@ import math
 import re
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import atan, exp, log, sqrt
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias, cast
 
 import numpy as np
 
@@ -97,10 +97,9 @@ class _Scalar:
     def constant(self) -> int | float | None:
         """Value, if it is written as one."""
         try:
-            value: int | float = ast.literal_eval(self.text)
+            return cast(float, ast.literal_eval(self.text))
         except ValueError:
             return None
-        return value
 
 
 @dataclass(frozen=True)
@@ -148,10 +147,12 @@ def _as(value: _Scalar, kind: str) -> str:
     return f"{kind}({value.text})"
 
 
+def _numbers(values: Sequence[_Scalar]) -> list[_Scalar]:
+    return [_Scalar(_as(each, NUMBER), NUMBER) for each in values]
+
+
 def _sum(first: str, second: str) -> str:
     """Sum of two places."""
-    if first.isdigit() and second.isdigit():
-        return str(int(first) + int(second))
     return second if first == "0" else first if second == "0" else f"{first} + {second}"
 
 
@@ -221,8 +222,7 @@ class Flattening:
     @property
     def source(self) -> Source:
         """Source for `translate`."""
-        functions = Source.of_text("\n".join(self.texts)).functions
-        return Source(constants=self.constants, functions=functions)
+        return replace(Source.of_text("\n".join(self.texts)), constants=self.constants)
 
     def named(self, name: str, value: int | float) -> str:
         """A constant by name; by value if its name means another."""
@@ -317,9 +317,6 @@ class _FunctionWriter:
                 raise self._refused(node)
 
     def _if(self, test: str, body: Sequence[ast.stmt], orelse: Sequence[ast.stmt]) -> None:
-        if test in ("True", "False"):
-            self.out += self._block(body if test == "True" else orelse)
-            return
         first, second = self._block(body), self._block(orelse)
         if first:
             self.out += [f"if {test}:", *_indented(first)]
@@ -378,10 +375,7 @@ class _FunctionWriter:
 
     def _before(self, value: _Value, changed: set[str]) -> Any:
         """A value that stays when some names change."""
-        return _mapped(
-            value,
-            lambda each: self._stored(each) if changed & set(re.findall(r"\w+", each.text)) else each,
-        )
+        return _mapped(value, lambda x: self._stored(x) if changed & set(re.findall(r"\w+", x.text)) else x)
 
     def _bind(self, target: ast.expr, value: _Value) -> None:
         match target:
@@ -622,16 +616,15 @@ class _FunctionWriter:
             return self._user(function, values)
         match name:
             case "complex":
-                return _Compound(tuple(_Scalar(_as(each, NUMBER), NUMBER) for each in values), COMPLEX)
+                return _Compound(tuple(_numbers(values)), COMPLEX)
             case "abs" if isinstance(values[0], _Compound):
-                return self._of_math("hypot", list(values[0].values))
+                return self._of_math("hypot", values[0].values)
             case "abs":
                 return _Scalar(f"abs({_as(values[0], NUMBER)})", NUMBER)
             case "min" | "max":
                 extreme, result = smaller if name == "min" else larger, values[0]
                 for other in values[1:]:
-                    both = [_Scalar(_as(each, NUMBER), NUMBER) for each in (result, other)]
-                    result = self._user(extreme, both)
+                    result = self._user(extreme, _numbers([result, other]))
                 of_whole = all(each.kind == WHOLE for each in values)
                 return _Scalar(_as(result, WHOLE), WHOLE) if of_whole else result
             case "bool" | "float" | "int":
@@ -640,10 +633,10 @@ class _FunctionWriter:
                 return _constant(len(values[0].layout.parts))
         raise self._refused(node)
 
-    def _of_math(self, name: str, values: list[Any]) -> Any:
+    def _of_math(self, name: str, values: Sequence[Any]) -> Any:
         if name == "phase":
-            name, values = "atan2", list(reversed(values[0].values))
-        numbers = [_Scalar(_as(each, NUMBER), NUMBER) for each in values]
+            name, values = "atan2", values[0].values[::-1]
+        numbers = _numbers(values)
         if name in MATHS:
             return _Scalar(f"{name}({numbers[0].text})", NUMBER)
         if name == "isfinite":

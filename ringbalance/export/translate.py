@@ -128,6 +128,11 @@ class _Reduction(ast.NodeTransformer):
         match node:
             case ast.For(ast.Name() as index, ast.Call(func=ast.Name(id="range"), args=ends), orelse=[]):
                 first, last = (ast.Constant(0), *ends)[-2:]
+                # Neither the index nor the names in its end may change within the loop.
+                fixed = {index.id, *(each.id for each in ast.walk(last) if isinstance(each, ast.Name))}
+                names = [each for part in node.body for each in ast.walk(part) if isinstance(each, ast.Name)]
+                if any(each.id in fixed and isinstance(each.ctx, ast.Store) for each in names):
+                    return node
                 increment = ast.Assign([index], ast.BinOp(index, ast.Add(), ast.Constant(1)))
                 loop = ast.While(ast.Compare(index, [ast.Lt()], [last]), [*node.body, increment], [])
                 return [self.generic_visit(ast.Assign([index], first)), self.generic_visit(loop)]

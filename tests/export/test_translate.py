@@ -34,6 +34,9 @@ HEAD = "N, X = 2, 0.5\n\ndef f(c: Law, a: float, n: int) -> float:\n"
         "return n",
         "x = a\n    x = n\n    return a",
         "for x in c:\n        pass",
+        "for n in range(3):\n        n = 5\n    return a",
+        "for i in range(n):\n        n = 5\n    return a",
+        "for i in range(3):\n        continue\n    return a",
         "a = x = a * 2.0\n    return a",
         "a, x = x, a\n    return a",
         "return 0.0 < a < 1.0",
@@ -54,6 +57,26 @@ def test_all_languages_have_the_same_statements() -> None:
     )
     text = st_functions(source, prefix="p", sizes={"Law": "0..3"})
     assert "IF NOT (v_a > 0.5) THEN\n    p_f := v_c[2 + (v_n / 2)];\n    RETURN;\nEND_IF;" in text
+
+
+def test_loops_sums_and_several_targets_are_reduced_to_what_all_languages_have() -> None:
+    source = Source.of_text(
+        f"{HEAD}    x = y = 0.0\n    i, k = n, 2\n    for j in range(1, n):\n"
+        "        x += row.larger(c[row.N + j], a)\n    return x\n"
+        "\ndef larger(a: row.Number, b: float) -> float:\n    return a\n"
+    )
+    assert source.functions["f"].text.split("\n")[1:] == [
+        "    x = 0.0",
+        "    y = 0.0",
+        "    i = n",
+        "    k = 2",
+        "    j = 1",
+        "    while j < n:",
+        "        x = x + larger(c[N + j], a)",
+        "        j = j + 1",
+        "    return x",
+    ]
+    assert source.functions["larger"].arguments == {"a": "Number", "b": "float"}
 
 
 def test_a_name_with_two_meanings_is_refused(tmp_path: Path) -> None:

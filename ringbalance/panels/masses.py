@@ -145,7 +145,9 @@ def _controls(scene: EccentricScene) -> dict[str, dict[str, Any]]:
     for name, path in _PLACES.items():
         controls[name]["places"] = [machine.index(path)]
     for name, key in _KEYS.items():
-        after = numbers_of(StrategySettings.of(scene.with_values({key: 2.0 * ranges[name][2] or 1.0})))
+        # A page keeps the averaging time, which the program derives from the limit.
+        changes = {"fine_tuning.average": scene.fine_tuning.average, key: 2.0 * ranges[name][2] or 1.0}
+        after = numbers_of(StrategySettings.of(scene.with_values(changes)))
         places = [i for i, (a, b) in enumerate(zip(before, after, strict=True)) if a != b]
         controls[name] |= {"places": places, "of": "strategy"}
     return controls

@@ -138,6 +138,18 @@ def test_a_rotor_without_damping_or_speed_still_has_defaults(
     assert (tuning.wait, tuning.average) == (30.0, 1.0)
 
 
+def test_the_mean_is_as_precise_as_the_limit_needs(least_document: dict[str, Any], load: Load) -> None:
+    """Whole turns, two at least; 2 sigma / sqrt(n) at most a twentieth of the limit; 30 s at most."""
+    turn, sensor = 60 / 100, least_document.setdefault("sensor", {})
+    for step, turns in (("1 ms", 2), ("0.01 s", 3), ("0.1 s", 30), ("1 s", 50)):
+        # A limit of three standard deviations: 178 samples.
+        sensor.update({"step": step, "position_noise": "0.1 mm"})
+        least_document["supervisor"] = {"limit": "0.3 mm"}
+        scene = load(least_document)
+        assert scene.fine_tuning.average == pytest.approx(turns * turn)
+        assert scene.mean_noise <= 0.05 * scene.supervisor.limit or scene.fine_tuning.average >= 30
+
+
 def test_each_kind_is_distinguished_from_the_other(paper_scene: Scene) -> None:
     driven = load_scene(bundled_scene("eccentric_mass_paper"))
     assert liquid_ring_scene(paper_scene) is paper_scene

@@ -48,6 +48,10 @@ _VELOCITY_WALK_FRACTION = 0.03
 The fraction is largest at the critical speed, where damping divides it.
 """
 _LONGEST_WAIT_S = 30.0
+_MEAN_NOISE_FRACTION = 0.05
+"""Noise of the mean vibration (95 %), as a fraction of the limit."""
+_LONGEST_AVERAGE_S = 30.0
+"""Bound of the averaging time for slow sensors; two turns of a slower rotor still take longer."""
 
 
 def _capacity(mass: float, radius: float) -> float:
@@ -71,11 +75,16 @@ def _settling(damping: float, rotor: float, mass: float) -> float:
     return _LONGEST_WAIT_S if damping * _LONGEST_WAIT_S <= 8 * twice_mass else 8 * twice_mass / damping
 
 
-def _two_turns(profile: Sequence[Any]) -> float:
-    """Time of two turns of the rotor at the start of a speed profile, s."""
+def _averaging(profile: Sequence[Any], noise: float, limit: float, step: float) -> float:
+    """Whole turns at the start of a speed profile that make the mean precise, s; without a speed 1 s.
+
+    The noise of the mean, 2 position_noise / sqrt(samples), is then at most 5 % of the limit.
+    """
     speeds = [abs(corner.speed) for corner in profile]
     fastest = speeds[0] or max(speeds) if speeds else 0.0
-    return 4 * math.pi / fastest if fastest else 1.0
+    precise = min(step * (2 * noise / (_MEAN_NOISE_FRACTION * limit)) ** 2, _LONGEST_AVERAGE_S)
+    turn = 2 * math.pi / fastest if fastest else 0.5
+    return turn * max(math.ceil(precise / turn), 2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -308,10 +317,14 @@ class FineTuning:
     average: Annotated[
         PositiveTime,
         derived(
-            "two turns of the rotor at the start",
-            "time over which the amplitude is averaged",
+            "two turns of the rotor at the start; more, up to 30 s, until the noise of the mean, "
+            "2 position_noise sqrt(step / average), is at most 5 % of limit",
+            "time over which the vibration is averaged; balanced is a mean at least its noise below limit",
             "rotor.speed_profile",
-            rule=_two_turns,
+            "sensor.position_noise",
+            "supervisor.limit",
+            "sensor.step",
+            rule=_averaging,
         ),
     ]
 

@@ -60,7 +60,10 @@ _STRONGER: Final = ("friction_filter.speed_gain", "friction_filter.drive_speed",
 _WALKS: Final = ("friction_filter.rate_walk", "friction_filter.friction_walk")
 _BY_END: Final[Mapping[EccentricOutcome, tuple[tuple[Mapping[str, float | str], ...], ...]]] = {
     EccentricOutcome.TIME_LIMIT: (tuple({"run.time_limit": factor} for factor in (2.0, 4.0, 16.0)),),
-    EccentricOutcome.RISES_AGAIN: (({"supervisor.correction": "measured"},),),
+    EccentricOutcome.RISES_AGAIN: (
+        ({"supervisor.correction": "measured"},),
+        tuple({"fine_tuning.average": factor} for factor in (4.0, 16.0)),
+    ),
     EccentricOutcome.TUNING_TIME: (({"supervisor.fine_tuning_time": 4.0, "run.time_limit": 2.0},),),
     EccentricOutcome.MASSES_MOVE: (
         ({"motor.maximum_voltage": 4.0},),

@@ -14,6 +14,7 @@ from ringbalance.controller.eccentric_mass.drive_law import believed_whirl
 from ringbalance.controller.eccentric_mass.memory import (
     BALANCED,
     CAUSE_NAMES,
+    CHECK,
     FAILED,
     FRICTION,
     HELD,
@@ -341,6 +342,8 @@ class EccentricRun(PresentedResult):
             "imbalance": abs(self.imbalance),
             "reach": 2 * scene.masses.mass * scene.masses.guide_radius,
             "residual": float(memory["left"]),
+            "average": scene.fine_tuning.average,
+            "mean_noise": scene.mean_noise,
             "deviation_ratio": deviation / abs(self.imbalance) if self.imbalance else None,
             "imbalance_gate": scene.imbalance_filter.gate,
             "friction_gate": scene.friction_filter.gate,
@@ -372,17 +375,20 @@ class EccentricRun(PresentedResult):
             code = "masses_run_away" if saturated else "masses_turn"
         elif self.outcome is EccentricOutcome.LOCKED and self.within_since is not None:
             code = "masses_locked_within"
+        elif self.outcome is EccentricOutcome.NOT_ARRIVED and self.stages[-2].name == STAGE_NAMES[CHECK]:
+            code = "masses_held_short"
         elif self.outcome is EccentricOutcome.RISES_AGAIN and self.left is None:
             code = "masses_not_kept"
         elif self.outcome is EccentricOutcome.RISES_AGAIN and self.left is not None:
-            # Either masses have moved, or the new speed magnifies the residual imbalance.
+            # Masses have moved, or the mean did not show the vibration, or the speed magnifies the residual.
             first = int(np.argmax(self.history["cause"] == BALANCED))
             moved = np.abs(self.mass_angle[:, first : self.left + 1] - self.mass_angle[:, [first]])
-            still = np.max(moved, initial=0.0) <= self.scene.supervisor.arrival_angle
             by_trials = self.scene.supervisor.correction == "trials"
             code = "masses_rises_by_trials" if by_trials else "masses_rises_by_speed"
-            if not still or self.speed[self.left] == self.speed[first]:
+            if np.max(moved, initial=0.0) > self.scene.supervisor.arrival_angle:
                 code = "masses_rises_again"
+            elif self.speed[self.left] == self.speed[first]:
+                code = "masses_not_kept"
         return self._finding(code)
 
     @cached_property

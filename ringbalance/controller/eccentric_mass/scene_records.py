@@ -295,6 +295,12 @@ class EccentricScene(SceneFile):
         return round(self.run.time_limit / self.sensor.step) + 1
 
     @property
+    def mean_noise(self) -> float:
+        """Noise of the mean of a check or a trial (95 %), m."""
+        samples = max(self.fine_tuning.average / self.sensor.step, 1.0)
+        return 2 * self.sensor.position_noise / math.sqrt(samples)
+
+    @property
     def steady_until(self) -> float | None:
         """Time at which the speed first changes, s; None if it is constant to the end of the run."""
         corners = pairwise(self.rotor.speed_profile)
@@ -316,8 +322,8 @@ _TABLES = {
     "imbalance_filter": TableSchema.of(ImbalanceFilter, "the Kalman filter that finds the imbalance"),
     "friction_filter": TableSchema.of(FrictionFilter, "the extended Kalman filter that finds the friction"),
     "lqr": TableSchema.of(Lqr, "the regulator that moves the masses"),
-    "fine_tuning": TableSchema.of(FineTuning, "the search by trial for a smaller vibration"),
     "supervisor": TableSchema.of(Supervisor, "the order of the stages, and when each ends"),
+    "fine_tuning": TableSchema.of(FineTuning, "the search by trial for a smaller vibration"),
     "requirement": TableSchema.of(EccentricRequirement, "what is required of the balancer"),
     "design": TableSchema.of(EccentricDesign, "what `ringbalance design` may choose"),
 }

@@ -84,7 +84,7 @@ class Gates(NamedTuple):
     wait: float
     average: float
     margin: float
-    """Reduction of the amplitude by which a trial or a correction counts as better, m."""
+    """Noise of a mean vibration (95 %), m: a trial or a correction counts as better beyond it."""
     moment: float
     """b, kg m."""
     gap: float
@@ -96,7 +96,6 @@ class Gates(NamedTuple):
     def of(cls, scene: EccentricScene, law: DriveLaw) -> Gates:
         """Derive the limits of a scene."""
         keys, tuning, whirl = scene.supervisor, scene.fine_tuning, law.whirl
-        averaged = max(tuning.average / scene.sensor.step, 1.0)
         # Long enough for the rotor's transient, which depends most on the assumed bearing, to decay.
         least_estimate = _LONGEST_ESTIMATE_FRACTION * keys.imbalance_time
         if whirl.damping > 0:
@@ -120,7 +119,7 @@ class Gates(NamedTuple):
             tuning_near=2 * law.near,
             wait=tuning.wait,
             average=tuning.average,
-            margin=2 * scene.sensor.position_noise / math.sqrt(averaged),
+            margin=scene.mean_noise,
             moment=law.track.moment,
             gap=scene.masses.gap,
             by_trials=keys.correction == "trials",

@@ -96,7 +96,7 @@ def supervise(
         elif time - memory.entered >= gates.positioning_time:
             _stay(memory, FAILED, time, NOT_ARRIVED)
     elif memory.stage in (CHECK, CORRECTION) and not is_constant(motion):
-        within = abs(memory.residual) <= gates.limit
+        within = _is_balanced(gates, abs(memory.residual))
         _rest_at(memory, memory.best_goal, time, BALANCED if within else SPEED_CHANGED)
     elif memory.stage == CHECK:
         _check(gates, law, memory, motion, time)
@@ -155,6 +155,12 @@ def _influence_of(law: DriveLaw, speed: float) -> complex:
 def is_constant(motion: Motion) -> bool:
     """Return True if the rotor's speed is constant."""
     return abs(motion.speed_rate) < STEADY_RAD_S2
+
+
+@in_place
+def _is_balanced(gates: Gates, mean: float) -> bool:
+    """Return True if a mean vibration shows the true one within the limit, whatever its noise."""
+    return mean + gates.margin <= gates.limit
 
 
 @in_place
@@ -271,7 +277,7 @@ def _correct(gates: Gates, memory: Record, mean: complex, influence: complex, ti
     done = judge_correction(memory, mean, gates.margin, memory.short > gates.tuning_near)
     memory.objective = abs(memory.residual)
     far = memory.short > gates.arrival_angle
-    within = far and abs(mean) <= gates.limit
+    within = far and _is_balanced(gates, abs(mean))
     done = done or within or gates.by_trials or influence == 0
     if not done and _aim_better(gates, memory, influence, far):
         enter(memory, CORRECTION, time, NONE)
@@ -284,8 +290,9 @@ def _correct(gates: Gates, memory: Record, mean: complex, influence: complex, ti
     else:
         # These targets are final: rest, failure, or fine tuning.
         memory.objective, hold = abs(mean), memory.hold
-        if memory.objective <= gates.limit or memory.saturated:
-            enter(memory, REST, time, BALANCED if memory.objective <= gates.limit else SATURATED)
+        within = _is_balanced(gates, abs(mean))
+        if within or memory.saturated:
+            enter(memory, REST, time, BALANCED if within else SATURATED)
             memory.hold = hold
         elif far:
             _stay(memory, FAILED, time, NOT_ARRIVED)
@@ -327,7 +334,7 @@ def _fine_tuning(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, ti
         mean = memory.total / memory.averaged
         next_trial(memory, abs(mean), gates.margin, gates.tuning_stop)
         memory.objective = memory.least
-        if memory.least <= gates.limit:
+        if _is_balanced(gates, memory.least):
             _learn(law, memory, mean, _influence_of(law, motion.speed))
             enter(memory, REST, time, BALANCED)
         else:

@@ -16,6 +16,7 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
+from ringbalance.scene.draws import run_noise
 from ringbalance.scene.origins import value_at
 from ringbalance.verification.papers import at_constant_speed, changed
 
@@ -113,6 +114,34 @@ def test_trials_alone_are_asked_for_by_a_key() -> None:
     assert measured.settling_time is not None
     assert trials.settling_time is not None
     assert measured.settling_time < 30 < trials.settling_time
+
+
+def near_the_limit(number: int, *, hasty: bool = False) -> EccentricRun:
+    """Run a device that `tune` draws. Args: `hasty`: True for a mean of two turns, taken as exact."""
+    small = bundled("driven_masses_small")
+    settings = StrategySettings.of(small)
+    if hasty:
+        settings = settings._replace(gates=settings.gates._replace(average=0.012, margin=0.0))
+    return simulate_eccentric(
+        device(small, number).scene, seed=run_noise(small.run.seed, number), settings=settings
+    )
+
+
+def test_balanced_is_a_mean_below_the_limit_by_its_noise() -> None:
+    """Two turns, 12 samples, whose noise is 12 % of the limit, pass for balanced what is 4 % above it."""
+    assert near_the_limit(85).settled
+    hasty = near_the_limit(85, hasty=True)
+    assert hasty.outcome == "rises_again"
+    assert hasty.ended.code == "masses_not_kept"
+    assert "raise fine_tuning.average" in hasty.status
+
+
+def test_masses_that_stop_short_of_their_targets_are_not_said_to_be_late() -> None:
+    """A run of 30 s, with 60 s allowed for the way to the targets."""
+    run = near_the_limit(123)
+    assert run.outcome == "not_arrived"
+    assert run.ended.code == "masses_held_short"
+    assert "arrival_angle, 0.2\N{DEGREE SIGN}" in run.status
 
 
 def loaded() -> EccentricScene:

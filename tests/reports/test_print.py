@@ -8,11 +8,12 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
 from check_traces import agrees, apart, traces, untrue
 
+from ringbalance.reports.page import render
 from ringbalance.reports.report import write_report
 from ringbalance.reports.traced import evidence_at
 from ringbalance.scene import load_scene
@@ -58,6 +59,37 @@ def test_the_report_prints_on_few_pages(pages: dict[str, str], tmp_path: Path) -
     for name, text in pages.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     assert 0 < printed_pages(tmp_path / "report.html") <= MOST_PAGES
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+@pytest.mark.parametrize("name", ["report.html", "annex.html"])
+def test_nothing_is_wider_than_paper(evidence: dict[str, Any], name: str, tmp_path: Path) -> None:
+    """Chromium shrinks a whole print until its widest table fits: letters of 8 pt would come out as 5 pt."""
+    gain = {"law": "paper", "drag_coefficient": 50.0, "velocity_m_s": 5.0, "gain_per_operation": 0.6}
+    gain |= {"moment_per_transferred_mass_m": 0.073, "slope_m_per_s": 7.5e-6}
+    evidence["consequences"] = {"gain": [gain], "paper": evidence["summary"]["own"]}
+    evidence["verification"][0]["quantities"][0] |= {
+        "title": "volume of two adjacent full chambers",
+        "uncertainty": 1.7e-9,
+        "reference": 6.885e-5,
+        "reference_uncertainty": 5.8e-9,
+        "validation": {"E": -1.3e-6, "u_val": 1.2e-8, "u_num": 5.0e-13, "u_input": 1.9e-9, "u_D": 2.9e-9},
+        "criterion": "within ±, and ± ≤ 1 %",
+    }
+    text = re.sub(r"@media screen[^{]*\{", "@media speech {", render(evidence)[name])
+    text = text.replace("@media print {", "@media all {")
+    measure = "<script>onload = () => { document.title = document.documentElement.scrollWidth; }</script>"
+    (tmp_path / name).write_text(text + measure, encoding="utf-8")
+    options = ("--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--dump-dom")
+    browser = (str(BROWSER), *options, "--window-size=665,1000", f"--user-data-dir={tmp_path / 'browser'}")
+    done = subprocess.run(
+        [*browser, str(tmp_path / name)],
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=True,
+    )
+    assert "<title>665</title>" in done.stdout
 
 
 @pytest.mark.heavy

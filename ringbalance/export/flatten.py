@@ -19,6 +19,7 @@ import re
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from enum import EnumType
 from math import atan, exp, log, sqrt
 from typing import Any, Final, TypeAlias, cast
 
@@ -63,7 +64,7 @@ class Layout:
         return sum(each.size for each in self.parts[:part])
 
     def index(self, path: str) -> int:
-        """Place of a number, such as "memory.friction.1.arm"."""
+        """Place of a number, such as "memory.friction.filter.1.arm"."""
         step, _, rest = path.partition(".")
         if not step:
             return 0
@@ -441,6 +442,9 @@ class _FunctionWriter:
                 return _Compound(tuple(map(self._value, elements)))
             case ast.Attribute(value=ast.Name(id="math"), attr=name):
                 return _constant(getattr(math, name))
+            case ast.Attribute(value=ast.Name(id=name), attr=member) if self._is_enum(name):
+                value = int(self.function.__globals__[name][member])
+                return _Scalar(self.program.named(f"{name}_{member}", value), WHOLE)
             case ast.Attribute() | ast.Subscript():
                 return self._read(self._place(node))
             case ast.Call():
@@ -471,6 +475,9 @@ class _FunctionWriter:
 
     def _truth(self, node: ast.expr) -> str:
         return _as(self._value(node), TRUTH)
+
+    def _is_enum(self, name: str) -> bool:
+        return isinstance(self.function.__globals__.get(name), EnumType)
 
     def _global(self, name: str) -> _Value:
         value, program = self.function.__globals__[name], self.program

@@ -19,7 +19,7 @@ from scipy.linalg import expm, solve_continuous_are
 
 import ringbalance as rb
 from ringbalance.cli import main
-from ringbalance.controller.eccentric_mass.memory import BALANCED, FRICTION, POSITIONING, REST
+from ringbalance.controller.eccentric_mass.memory import Cause, Stage
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import Machine, measure, sensor_noise
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
@@ -96,7 +96,7 @@ def test_the_loop_in_c_is_the_programs_over_all_stages(tmp_path: Path, name: str
     noise = np.hstack([np.zeros((count, 3)), sensor_noise(scene, scene.run.seed)[:count]])
     ran = subprocess.run([tmp_path / "loop"], input=noise.tobytes(), capture_output=True, check=True)
     told = np.frombuffer(ran.stdout).reshape(-1, 13)
-    assert {FRICTION, POSITIONING, REST} <= set(history["stage"].tolist())
+    assert {Stage.FRICTION_ESTIMATION, Stage.POSITIONING, Stage.REST} <= set(history["stage"].tolist())
     for column, key in ((10, "stage"), (11, "cause"), (12, "hold")):
         assert np.array_equal(told[:, column], history[key])
     for values, right in ((told[:, :8], history["state"]), (told[:, 8:10], history["voltage"])):
@@ -108,7 +108,7 @@ def test_the_loop_in_c_is_the_programs_over_all_stages(tmp_path: Path, name: str
 def test_what_a_run_measured_gives_its_voltages(tmp_path: Path, name: str) -> None:
     """In JavaScript over all stages, in Python over 5,000 samples: to 1e-12 of the largest voltage."""
     block, history = strategy_block(scene_of(name)), run_of(name).history
-    assert np.any(history["stage"][:SAMPLES] == REST)
+    assert np.any(history["stage"][:SAMPLES] == Stage.REST)
     rows, columns = measured(name), {key: at for at, key in enumerate(outputs_of(block))}
     (tmp_path / "ctrl.mjs").write_text(js_files(block, "ctrl")["ctrl.mjs"])
     command = ["node", str(HERE / "same_bits.mjs"), str(tmp_path / "ctrl.mjs"), str(len(rows))]
@@ -300,4 +300,4 @@ def test_the_example_of_the_page_balances(tmp_path: Path) -> None:
     command = ["gcc", *WARNINGS, "-O2", "main.c", "ctrl.c", "plant.c", "-lm", "-o", "main"]
     subprocess.run(command, cwd=tmp_path, check=True)
     ran = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True)
-    assert ran.stdout == f"stage {REST}, cause {BALANCED}\n"
+    assert ran.stdout == f"stage {Stage.REST}, cause {Cause.BALANCED}\n"

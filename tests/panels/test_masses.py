@@ -14,7 +14,7 @@ from page_modules import in_node, needs_node
 
 import ringbalance as rb
 from ringbalance.cli import main
-from ringbalance.controller.eccentric_mass.memory import REST, STAGE_NAMES
+from ringbalance.controller.eccentric_mass.memory import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import SENSOR_NOISES
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
@@ -79,7 +79,7 @@ def test_a_run_with_the_programs_noise_is_the_programs(name: str) -> None:
         stride=7,
         voltages=inputs_of(name),
     )
-    assert STAGE_NAMES[REST] in [each["name"] for each in answer["stages"]]
+    assert STAGE_NAMES[Stage.REST] in [each["name"] for each in answer["stages"]]
     assert [(each["name"], pytest.approx(each["time"])) for each in answer["stages"]] == [
         (each.name, each.start) for each in run.stages
     ]
@@ -139,6 +139,8 @@ def test_a_control_sets_the_constants_of_the_changed_scene(name: str, factor: fl
         "drive_speed": ("friction_filter.drive_speed", scene.friction_filter.drive_speed),
     }
     values: dict[str, Any] = {keys[each][0]: factor * keys[each][1] for each in changes if each in keys}
+    # A page keeps the averaging time, which the program derives from the limit.
+    values["fine_tuning.average"] = scene.fine_tuning.average
     values["masses.friction_arm"] = [factor * arm for arm in scene.masses.friction_arm]
     if factor == 0.0:
         del values["imbalance.radius"]

@@ -33,7 +33,7 @@ from ringbalance.controller.eccentric_mass.devices import (
     imbalance_ratios,
     on_rotor,
 )
-from ringbalance.controller.eccentric_mass.memory import REST, STAGE_NAMES
+from ringbalance.controller.eccentric_mass.memory import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.outcome import EccentricOutcome
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.remedies import remedies_of
@@ -218,7 +218,7 @@ class EccentricMassBalancer(Balancer):
     def _soon(self) -> float:
         """Time at which the runs of a search end, s: when the speed changes, or long after the scene's own
         run has come to rest."""
-        rest = [each.start for each in self._nominal.stages if each.name == STAGE_NAMES[REST]]
+        rest = [each.start for each in self._nominal.stages if each.name == STAGE_NAMES[Stage.REST]]
         start, steady = self.scene.supervisor.start, self.scene.steady_until or self.scene.run.time_limit
         return min(steady, start + _REST_TIMES * (rest[0] - start)) if rest else steady
 

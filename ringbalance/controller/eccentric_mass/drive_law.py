@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 
 from ringbalance.controller.eccentric_mass.friction_filter import TrackModel
 from ringbalance.controller.eccentric_mass.imbalance_filter import WhirlModel
+from ringbalance.controller.eccentric_mass.memory import Pair
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.platform.compiled import in_place
@@ -22,7 +23,6 @@ SLOWEST_RATE_RAD_S: Final = 1e-3
 """Lower bound of the rate below which a mass counts as resting, for an exact encoder."""
 _BREAK_AWAY_SIGMA: Final = 3.0
 """Standard deviations of the friction arm that are added to its estimate to break a resting mass away."""
-Pair = tuple[float, float]
 
 
 class DriveLaw(NamedTuple):

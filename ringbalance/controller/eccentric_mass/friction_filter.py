@@ -42,18 +42,9 @@ class FrictionNoise(NamedTuple):
 
 
 FRICTION_FILTER: Final = np.dtype(
-    [
-        (name, np.float64)
-        for name in (
-            "rate",  # w, rad/s
-            "arm",  # friction arm mu, m
-            "rate_variance",
-            "covariance",  # of rate and arm, rad m/s
-            "arm_variance",
-        )
-    ]
+    [(name, np.float64) for name in ("rate", "arm", "rate_variance", "covariance", "arm_variance")]
 )
-"""Estimate of one mass's state."""
+"""Estimate of one mass: rate w, rad/s, friction arm mu, m, and the covariance of both."""
 
 
 @in_place

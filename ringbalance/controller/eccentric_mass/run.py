@@ -12,10 +12,10 @@ import numpy as np
 from ringbalance.controller.balancer import Progress
 from ringbalance.controller.eccentric_mass.memory import (
     HISTORY,
-    LOCKED_MASSES,
     MEMORY,
-    RELEASED,
+    Cause,
     EccentricMeasurement,
+    Hold,
 )
 from ringbalance.controller.eccentric_mass.plant import (
     ANGLE,
@@ -128,8 +128,8 @@ def _run_interval(
     for i in range(first, after):
         measurement = measure(machine, settings.laboratory, row, i * settings.step, noise[i])
         if machine.locked:
-            memory.cause, memory.hold = LOCKED_MASSES, RELEASED
-            memory.goal[0], memory.goal[1] = row[ANGLE], row[ANGLE + 1]
+            memory.cause, memory.hold = Cause.LOCKED, Hold.RELEASED
+            memory.travel.goal[0], memory.travel.goal[1] = row[ANGLE], row[ANGLE + 1]
         else:
             strategy_step(settings, memory, measurement)
         sample = history[i]
@@ -138,12 +138,12 @@ def _run_interval(
         for k in range(SIZE):
             sample.state[k] = row[k]
         for k in range(2):
-            sample.voltage[k], sample.goal[k] = memory.voltage[k], memory.goal[k]
-            sample.friction_arm[k] = memory.friction[k].arm
-            sample.friction_variance[k] = memory.friction[k].arm_variance
-            sample.imbalance[k] = memory.filter.state[4 + k]
+            sample.voltage[k], sample.goal[k] = memory.voltage[k], memory.travel.goal[k]
+            sample.friction_arm[k] = memory.friction.filter[k].arm
+            sample.friction_variance[k] = memory.friction.filter[k].arm_variance
+            sample.imbalance[k] = memory.estimation.filter.state[4 + k]
             for m in range(2):
-                sample.imbalance_covariance[k, m] = memory.filter.covariance[4 + k, 4 + m]
+                sample.imbalance_covariance[k, m] = memory.estimation.filter.covariance[4 + k, 4 + m]
             row[VOLTAGE + k] = memory.voltage[k]
         energy += plant_step(machine.plant, row, measurement.speed, measurement.speed_rate, settings.step)
         sample.energy = energy

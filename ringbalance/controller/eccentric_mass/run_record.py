@@ -11,25 +11,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.drive_law import believed_whirl
-from ringbalance.controller.eccentric_mass.memory import (
-    BALANCED,
-    CAUSE_NAMES,
-    CHECK,
-    FAILED,
-    FRICTION,
-    HELD,
-    IMBALANCE,
-    LOCKED_MASSES,
-    NONE,
-    POSITIONING,
-    RELEASED,
-    REST,
-    SPEED_CHANGED,
-    SPEED_NOT_CONSTANT,
-    STAGE_NAMES,
-    STALLED,
-    TOO_SLOW,
-)
+from ringbalance.controller.eccentric_mass.memory import CAUSE_NAMES, STAGE_NAMES, Cause, Hold, Stage
 from ringbalance.controller.eccentric_mass.outcome import OF_DRIVES, EccentricOutcome
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.resolution import rotor_covariance
@@ -91,8 +73,8 @@ class EccentricRun(PresentedResult):
     def innovation(self) -> float | None:
         """Mean square of the imbalance filter's normalised innovations: 1 for a true model; None without
         samples."""
-        judged = int(self.memory["judged"])
-        return float(self.memory["surprise"]) / (4 * judged) if judged else None
+        judged = int(self.memory["estimation"]["judged"])
+        return float(self.memory["estimation"]["surprise"]) / (4 * judged) if judged else None
 
     @cached_property
     def time(self) -> FloatArray:
@@ -142,7 +124,7 @@ class EccentricRun(PresentedResult):
     @property
     def drive_off(self) -> BoolArray:
         """True where both drives are off, shape (n,)."""
-        return np.asarray(self.history["hold"] == RELEASED)
+        return np.asarray(self.history["hold"] == Hold.RELEASED)
 
     @property
     def limit(self) -> float:
@@ -169,7 +151,7 @@ class EccentricRun(PresentedResult):
         """Sample of the largest vibration above the limit after the rotor was balanced within it; None if it
         stays within.
         """
-        done = np.isin(self.history["cause"], (BALANCED, SPEED_CHANGED))
+        done = np.isin(self.history["cause"], (Cause.BALANCED, Cause.SPEED_CHANGED))
         within = np.flatnonzero(done & (self.amplitude <= self.limit))
         if within.size == 0:
             return None
@@ -188,23 +170,23 @@ class EccentricRun(PresentedResult):
         """Outcome; SETTLED if the true amplitude stays within the limit to the end, in any stage."""
         if self.diverged:
             return EccentricOutcome.DIVERGED
-        speed, memory = self.speed, self.memory
+        speed = self.speed
         last_cause = cause = int(self.history["cause"][-1])
-        if cause == LOCKED_MASSES:
+        if cause == Cause.LOCKED:
             return EccentricOutcome.LOCKED
         # A run that ends within a stage may already show why the stage would have failed.
-        if self.stage == IMBALANCE and abs(speed[-1]) < self.scene.supervisor.lowest_speed:
-            cause = TOO_SLOW
-        elif self.stage == IMBALANCE and speed.size > 1 and speed[-1] != speed[-2]:
-            cause = SPEED_NOT_CONSTANT
-        elif self.stage == FRICTION and memory["stalled"] > STALLED_SHARE * memory["driven"]:
-            cause = STALLED
+        if self.stage == Stage.IMBALANCE_ESTIMATION and abs(speed[-1]) < self.scene.supervisor.lowest_speed:
+            cause = Cause.TOO_SLOW
+        elif self.stage == Stage.IMBALANCE_ESTIMATION and speed.size > 1 and speed[-1] != speed[-2]:
+            cause = Cause.SPEED_NOT_CONSTANT
+        elif self.stage == Stage.FRICTION_ESTIMATION and self._stalled_fraction > STALLED_SHARE:
+            cause = Cause.STALLED
         # The amplitude of a rotor that is too slow proves nothing.
-        if cause != TOO_SLOW and self.within_since is not None and self.left is None:
+        if cause != Cause.TOO_SLOW and self.within_since is not None and self.left is None:
             return EccentricOutcome.SETTLED
-        if last_cause == BALANCED:
+        if last_cause == Cause.BALANCED:
             return EccentricOutcome.RISES_AGAIN
-        return EccentricOutcome.TIME_LIMIT if cause == NONE else EccentricOutcome(CAUSE_NAMES[cause])
+        return EccentricOutcome.TIME_LIMIT if cause == Cause.NONE else EccentricOutcome(CAUSE_NAMES[cause])
 
     @property
     def settling_time(self) -> float | None:
@@ -220,12 +202,18 @@ class EccentricRun(PresentedResult):
     @cached_property
     def estimated_at(self) -> IntArray:
         """Samples at which the imbalance was estimated."""
-        return np.flatnonzero(self.history["stage"] == IMBALANCE)
+        return np.flatnonzero(self.history["stage"] == Stage.IMBALANCE_ESTIMATION)
 
     @property
     def friction_known(self) -> bool:
         """True if the friction stage was completed, hence its drives suffice."""
-        return bool(np.any(self.history["stage"] == POSITIONING))
+        return bool(np.any(self.history["stage"] == Stage.POSITIONING))
+
+    @property
+    def _stalled_fraction(self) -> float:
+        """Fraction of the friction stage with a mass nearly at standstill."""
+        friction = self.memory["friction"]
+        return int(friction["stalled"]) / max(int(friction["driven"]), 1)
 
     @property
     def imbalance(self) -> complex:
@@ -254,7 +242,7 @@ class EccentricRun(PresentedResult):
     @property
     def friction_half_width(self) -> FloatArray:
         """Half-widths (95 %) of the friction arms, m, by noise, motor and masses, shape (2,)."""
-        doubt = np.square(self.memory["arm_doubt"])
+        doubt = np.square(self.memory["friction"]["arm_doubt"])
         return np.asarray(NORMAL_95 * np.sqrt(self.history["friction_variance"][-1] + doubt))
 
     @property
@@ -323,13 +311,13 @@ class EccentricRun(PresentedResult):
         """Largest net travel of a mass from the start of positioning to the end of the run, turns."""
         if not self.friction_known:
             return 0.0
-        start = int(np.argmax(self.history["stage"] == POSITIONING))
+        start = int(np.argmax(self.history["stage"] == Stage.POSITIONING))
         return float(np.max(np.abs(self.mass_angle[:, -1] - self.mass_angle[:, start]))) / (2 * np.pi)
 
     @cached_property
     def _numbers(self) -> dict[str, Value]:
         """Values by the names that sentences use; those of [supervisor] under its keys."""
-        scene, memory, worst = self.scene, self.memory, self.left
+        scene, worst = self.scene, self.left
         # Standard deviation of the imbalance by noise, kg m.
         deviation = float(np.sqrt(np.max(np.linalg.eigvalsh(self.history["imbalance_covariance"][-1]))))
         return {
@@ -341,7 +329,7 @@ class EccentricRun(PresentedResult):
             "later_speed": None if worst is None else float(self.speed[worst]),
             "imbalance": abs(self.imbalance),
             "reach": 2 * scene.masses.mass * scene.masses.guide_radius,
-            "residual": float(memory["left"]),
+            "residual": float(self.memory["correction"]["left"]),
             "average": scene.fine_tuning.average,
             "mean_noise": scene.mean_noise,
             "deviation_ratio": deviation / abs(self.imbalance) if self.imbalance else None,
@@ -350,7 +338,7 @@ class EccentricRun(PresentedResult):
             "stage": STAGE_NAMES[self.stage],
             "turns": self.run_away,
             "cause": CAUSE_NAMES[int(self.history["cause"][-1])].replace("_", " "),
-            "stalled_fraction": int(memory["stalled"]) / max(int(memory["driven"]), 1),
+            "stalled_fraction": self._stalled_fraction,
             "saturation": self.saturation,
             "euler_limit": _euler_limit(self),
             "innovation": self.innovation,
@@ -375,13 +363,15 @@ class EccentricRun(PresentedResult):
             code = "masses_run_away" if saturated else "masses_turn"
         elif self.outcome is EccentricOutcome.LOCKED and self.within_since is not None:
             code = "masses_locked_within"
-        elif self.outcome is EccentricOutcome.NOT_ARRIVED and self.stages[-2].name == STAGE_NAMES[CHECK]:
+        elif (
+            self.outcome is EccentricOutcome.NOT_ARRIVED and self.stages[-2].name == STAGE_NAMES[Stage.CHECK]
+        ):
             code = "masses_held_short"
         elif self.outcome is EccentricOutcome.RISES_AGAIN and self.left is None:
             code = "masses_not_kept"
         elif self.outcome is EccentricOutcome.RISES_AGAIN and self.left is not None:
             # Masses have moved, or the mean did not show the vibration, or the speed magnifies the residual.
-            first = int(np.argmax(self.history["cause"] == BALANCED))
+            first = int(np.argmax(self.history["cause"] == Cause.BALANCED))
             moved = np.abs(self.mass_angle[:, first : self.left + 1] - self.mass_angle[:, [first]])
             by_trials = self.scene.supervisor.correction == "trials"
             code = "masses_rises_by_trials" if by_trials else "masses_rises_by_speed"
@@ -398,15 +388,15 @@ class EccentricRun(PresentedResult):
         unlike = self.innovation is not None and self.innovation > _WRONG_MODEL_INNOVATION
         # The Euler transition is the cause to remove first.
         by_euler = keys.discretisation == "euler" and (unlike or keys.step > _euler_limit(self))
-        stalled = int(self.memory["stalled"]) > _NOTICEABLE_STALL_FRACTION * int(self.memory["driven"])
+        nearly_stalled = self._stalled_fraction > _NOTICEABLE_STALL_FRACTION
         due = {
-            "strategy_not_finished": settled and self.stage not in {REST, FAILED},
-            "strategy_failed": settled and self.stage == FAILED,
-            "drive_nearly_stalled": stalled and not self.friction_known,
+            "strategy_not_finished": settled and self.stage not in {Stage.REST, Stage.FAILED},
+            "strategy_failed": settled and self.stage == Stage.FAILED,
+            "drive_nearly_stalled": nearly_stalled and not self.friction_known,
             "voltage_at_limit": self.saturation > 0,
             "euler_too_coarse": by_euler,
             "innovations_unlike_model": unlike and not by_euler,
-            "drives_stay_on": int(self.history["hold"][-1]) == HELD,
+            "drives_stay_on": int(self.history["hold"][-1]) == Hold.HELD,
             "masses_meet": self.least_gap < self.scene.masses.gap,
         }
         return (*_unstable(self.scene), *(self._finding(code) for code, is_due in due.items() if is_due))

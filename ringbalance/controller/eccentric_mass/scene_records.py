@@ -297,8 +297,7 @@ class EccentricScene(SceneFile):
     @property
     def mean_noise(self) -> float:
         """Noise of the mean of a check or a trial (95 %), m."""
-        samples = max(self.fine_tuning.average / self.sensor.step, 1.0)
-        return 2 * self.sensor.position_noise / math.sqrt(samples)
+        return 2 * self.sensor.position_noise / math.sqrt(max(self.fine_tuning.average / self.sensor.step, 1))
 
     @property
     def steady_until(self) -> float | None:

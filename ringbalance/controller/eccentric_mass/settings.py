@@ -8,12 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.control_records import Supervisor
 from ringbalance.controller.eccentric_mass.drive_law import (
     SLOWEST_RATE_RAD_S,
     SMOOTHING_TIME_S,
     DriveLaw,
-    Pair,
     believed_whirl,
     track_model,
 )
@@ -23,6 +21,7 @@ from ringbalance.controller.eccentric_mass.imbalance_filter import (
     FilterSettings,
     imbalance_filter,
 )
+from ringbalance.controller.eccentric_mass.memory import Pair
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.arrays import FloatArray
@@ -47,7 +46,7 @@ _FRICTION_ERROR_FRACTION = 0.1
 
 
 class Gates(NamedTuple):
-    """Limits between the stages; fields named as keys of [supervisor] have their values."""
+    """Limits between the stages; fields named as keys of [supervisor] or [fine_tuning] have their values."""
 
     start: float
     limit: float
@@ -85,8 +84,6 @@ class Gates(NamedTuple):
     average: float
     margin: float
     """Noise of a mean vibration (95 %), m: a trial or a correction counts as better beyond it."""
-    moment: float
-    """b, kg m."""
     gap: float
     """Angle that one mass occupies on the track, rad."""
     by_trials: bool
@@ -96,6 +93,7 @@ class Gates(NamedTuple):
     def of(cls, scene: EccentricScene, law: DriveLaw) -> Gates:
         """Derive the limits of a scene."""
         keys, tuning, whirl = scene.supervisor, scene.fine_tuning, law.whirl
+        values = vars(tuning) | vars(keys)
         # Long enough for the rotor's transient, which depends most on the assumed bearing, to decay.
         least_estimate = _LONGEST_ESTIMATE_FRACTION * keys.imbalance_time
         if whirl.damping > 0:
@@ -104,9 +102,8 @@ class Gates(NamedTuple):
         for plant in off_by_one(scene, _CONSTANTS):
             change = np.divide(_drive_ratios(plant) - ratios, ratios, out=np.zeros(2), where=ratios > 0)
             constants += np.outer(change, change)
-        shared = [name for name in cls._fields if name in Supervisor.__dataclass_fields__]
         return cls(
-            **{name: getattr(keys, name) for name in shared},
+            **{name: values[name] for name in cls._fields if name in values},
             noticeable=max(_NOTICEABLE_FRACTION * keys.arrival_angle, 2 * law.near),
             imbalance_gate=scene.imbalance_filter.gate,
             friction_gate=scene.friction_filter.gate,
@@ -117,10 +114,7 @@ class Gates(NamedTuple):
             tuning_step=tuning.step,
             tuning_stop=tuning.stop,
             tuning_near=2 * law.near,
-            wait=tuning.wait,
-            average=tuning.average,
             margin=scene.mean_noise,
-            moment=law.track.moment,
             gap=scene.masses.gap,
             by_trials=keys.correction == "trials",
         )
@@ -211,10 +205,7 @@ class StrategySettings(NamedTuple):
                 filter_settings(scene)._replace(step=sensor.step * every), speeds=scene.rotor.plateaus
             ),
             sensor=_SensorSettings(
-                position=keys.position_noise,
-                velocity=keys.velocity_noise,
-                angle=sensor.encoder_noise,
-                rate=sensor.encoder_rate_noise,
+                keys.position_noise, keys.velocity_noise, sensor.encoder_noise, sensor.encoder_rate_noise
             ),
             filter_every=every,
             friction=_FrictionSettings.of(scene),

@@ -17,6 +17,7 @@ does not help is halved.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from ringbalance.controller.eccentric_mass.memory import Pair
@@ -96,37 +97,37 @@ MOVES = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
 
 
 @in_place
-def begin_tuning(memory: Record, step: float) -> None:
-    """Begin the search by trial from the present goal. Args: `step`: first move, rad."""
-    set_pair(memory.base, memory.goal[0], memory.goal[1])
-    memory.least, memory.move_size = memory.objective, step
-    memory.move, memory.failed, memory.done = 0, 0, 0
+def begin_tuning(tuning: Record, goal: Sequence[float], amplitude: float, step: float) -> None:
+    """Begin the search by trial from a goal and its mean amplitude, m. Args: `step`: first move, rad."""
+    set_pair(tuning.base, goal[0], goal[1])
+    tuning.least, tuning.move_size = amplitude, step
+    tuning.move, tuning.failed, tuning.done = 0, 0, 0
 
 
 @in_place
-def tuning_place(memory: Record) -> Pair:
+def tuning_place(tuning: Record) -> Pair:
     """Angles of the present trial, rad; the best angles when the search is done."""
-    step = 0.0 if memory.done else memory.move_size
-    first, second = MOVES[memory.move]
-    return memory.base[0] + step * first, memory.base[1] + step * second
+    step = 0.0 if tuning.done else tuning.move_size
+    first, second = MOVES[tuning.move]
+    return tuning.base[0] + step * first, tuning.base[1] + step * second
 
 
 @in_place
-def next_trial(memory: Record, objective: float, margin: float, stop: float) -> None:
+def next_trial(tuning: Record, objective: float, margin: float, stop: float) -> None:
     """Process the result of the present trial; a move that helped is tried again first.
 
     Args: `objective`: mean amplitude of the trial, m; infinite for angles at which the masses overlap.
     Source: section 3.6 of the paper on eccentric masses, with staying as a candidate and halved moves.
     """
-    if objective < memory.least - margin:
-        first, second = tuning_place(memory)
-        set_pair(memory.base, first, second)
-        memory.least, memory.failed = objective, 0
+    if objective < tuning.least - margin:
+        first, second = tuning_place(tuning)
+        set_pair(tuning.base, first, second)
+        tuning.least, tuning.failed = objective, 0
         return
-    memory.move, memory.failed = (memory.move + 1) % 4, memory.failed + 1
-    if memory.failed > 3:
-        memory.move_size, memory.failed = 0.5 * memory.move_size, 0
-        memory.done = 1 if memory.move_size < stop else 0
+    tuning.move, tuning.failed = (tuning.move + 1) % 4, tuning.failed + 1
+    if tuning.failed > 3:
+        tuning.move_size, tuning.failed = 0.5 * tuning.move_size, 0
+        tuning.done = 1 if tuning.move_size < stop else 0
 
 
 @in_place
@@ -143,31 +144,41 @@ _SHOWN_MARGINS: Final = 2.0
 
 
 @in_place
-def judge_correction(memory: Record, residual: complex, margin: float, held: bool) -> bool:
+def begin_correction(correction: Record, imbalance: complex, goal: Pair) -> None:
+    """Begin with the first targets, for the estimated imbalance; no mean vibration is known yet."""
+    correction.residual, correction.share, correction.steps = complex(math.inf, 0.0), 1.0, 0
+    correction.aim, correction.best_aim = imbalance, imbalance
+    set_pair(correction.goal, goal[0], goal[1])
+    set_pair(correction.best_goal, goal[0], goal[1])
+
+
+@in_place
+def judge_correction(correction: Record, residual: complex, margin: float, held: bool) -> bool:
     """Compare a mean vibration with that of the best goal so far, and keep the better goal.
 
     A step that did not help is halved. Args: `held`: True if friction held a mass short of its goal; if the
     vibration did not rise, the new goal is kept, so that the next step adds to it and the mass breaks away.
     Returns: True if the correction is complete: no gain to show, steps too small, or too many.
     """
-    amplitude, best = abs(residual), abs(memory.residual)
-    better = amplitude < best - margin or memory.share == 0
+    amplitude, best = abs(residual), abs(correction.residual)
+    better = amplitude < best - margin or correction.share == 0
     if not better:
-        memory.share *= 0.5
+        correction.share *= 0.5
     if better or (held and amplitude <= best + margin):
-        memory.residual, memory.corrected = residual, memory.aim
-        set_pair(memory.best_goal, memory.aimed[0], memory.aimed[1])
+        correction.residual, correction.best_aim = residual, correction.aim
+        set_pair(correction.best_goal, correction.goal[0], correction.goal[1])
     else:
-        aim_back(memory)
-    shown = abs(memory.residual) > _SHOWN_MARGINS * margin
-    return bool(not shown or memory.share < _LEAST_STEP_FRACTION or memory.steps >= MAX_CORRECTION_STEPS)
+        aim_back(correction)
+    shown = abs(correction.residual) > _SHOWN_MARGINS * margin
+    small = correction.share < _LEAST_STEP_FRACTION
+    return bool(not shown or small or correction.steps >= MAX_CORRECTION_STEPS)
 
 
 @in_place
-def aim_back(memory: Record) -> None:
+def aim_back(correction: Record) -> None:
     """Reset aim and targets to the best goal so far."""
-    memory.aim = memory.corrected
-    set_pair(memory.aimed, memory.best_goal[0], memory.best_goal[1])
+    correction.aim = correction.best_aim
+    set_pair(correction.goal, correction.best_goal[0], correction.best_goal[1])
 
 
 @in_place

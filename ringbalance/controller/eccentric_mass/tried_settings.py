@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from ringbalance.controller.eccentric_mass.drive_law import track_model
-from ringbalance.controller.eccentric_mass.memory import FRICTION, IMBALANCE, STAGE_NAMES
+from ringbalance.controller.eccentric_mass.memory import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
@@ -37,7 +37,10 @@ _FRICTION_ANGLE_RAD: Final = 0.2
 """Distance from its goal at which the regulator overcomes all friction, uncompensated."""
 _FRICTION_FACTOR: Final = 1.5
 """Torque of the speed control at standstill over the friction, at the drive speed."""
-_GATES: Final = {IMBALANCE: "imbalance_filter.gate", FRICTION: "friction_filter.gate"}
+_GATES: Final = {
+    Stage.IMBALANCE_ESTIMATION: "imbalance_filter.gate",
+    Stage.FRICTION_ESTIMATION: "friction_filter.gate",
+}
 """Gate by the stage that it ends."""
 _GATE_FACTORS: Final = ((1.0, 2.0, 4.0), (0,))
 _LONG: Final = 1.5
@@ -92,7 +95,10 @@ def sized_gains(scene: EccentricScene) -> dict[str, float]:
 
 
 def _gates(scene: EccentricScene, nominal: EccentricRun) -> Iterator[str]:
-    least = {IMBALANCE: StrategySettings.of(scene).gates.least_estimate, FRICTION: LEAST_DRIVE_TIME_S}
+    least = {
+        Stage.IMBALANCE_ESTIMATION: StrategySettings.of(scene).gates.least_estimate,
+        Stage.FRICTION_ESTIMATION: LEAST_DRIVE_TIME_S,
+    }
     lasted = {each.name: each.end - each.start for each in nominal.stages}
     for stage, path in _GATES.items():
         if lasted.get(STAGE_NAMES[stage], 0.0) > _LONG * least[stage]:

@@ -10,7 +10,7 @@ from eccentric_runs import bundled, stage_names
 
 from ringbalance.controller.balancer import Draws, balancer_of
 from ringbalance.controller.eccentric_mass.devices import device
-from ringbalance.controller.eccentric_mass.memory import HELD, RELEASED
+from ringbalance.controller.eccentric_mass.memory import Hold
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
@@ -170,7 +170,7 @@ def test_drives_that_hold_leave_a_balanced_rotor_alone(seed: int) -> None:
     assert run.amplitude[ramp].max() < 0.3 * run.limit
     assert np.ptp(run.mass_angle[:, ramp], axis=1).max() < math.radians(0.1)
     hold = run.history["hold"][ramp]
-    assert set(hold) == {RELEASED, HELD}
+    assert set(hold) == {Hold.RELEASED, Hold.HELD}
     assert np.count_nonzero(np.diff(hold)) <= 2
-    assert hold[-1] == RELEASED
+    assert hold[-1] == Hold.RELEASED
     assert "drives_stay_on" not in {each.code for each in run.warned}

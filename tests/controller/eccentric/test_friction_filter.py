@@ -188,9 +188,11 @@ def test_a_motor_that_is_off_moves_the_arms_by_what_the_drives_take_off_them() -
     settings = StrategySettings.of(doubtful)
     same, off = (simulate_eccentric(each, settings=settings) for each in (doubtful, plant))
     moved = np.abs(off.history["friction_arm"][-1] - same.history["friction_arm"][-1])
-    doubt = same.memory["arm_doubt"]
+    doubt = same.memory["friction"]["arm_doubt"]
     np.testing.assert_allclose(moved, doubt, rtol=0.15, atol=2e-5)
     assert doubt.max() > 2e-4
     for mass in range(2):
         noise = same.history["friction_variance"][-1][mass]
-        assert arm_deviation(same.memory, mass) == pytest.approx(math.sqrt(noise + doubt[mass] ** 2))
+        assert arm_deviation(same.memory["friction"], mass) == pytest.approx(
+            math.sqrt(noise + doubt[mass] ** 2)
+        )

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.controller.eccentric_mass.memory import MEMORY
+from ringbalance.controller.eccentric_mass.memory import TUNING
 from ringbalance.controller.eccentric_mass.targets import (
     MOVES,
     assign,
@@ -113,20 +113,19 @@ def vibration(first: float, second: float) -> float:
 
 
 def begun(goal: tuple[float, float], objective: float, step: float) -> np.void:
-    memory: np.void = np.zeros(1, dtype=MEMORY)[0]
-    memory["goal"], memory["objective"] = goal, objective
-    begin_tuning(memory, step)
-    return memory
+    tuning: np.void = np.zeros(1, dtype=TUNING)[0]
+    begin_tuning(tuning, goal, objective, step)
+    return tuning
 
 
 def search(start: tuple[float, float], step: float, stop: float) -> tuple[np.void, int]:
-    """The memory at the end, and the number of trials."""
-    memory, trials = begun(start, vibration(*start), step), 0
-    while not memory["done"]:
-        next_trial(memory, vibration(*tuning_place(memory)), 0.0, stop)
+    """The memory of the search at its end, and the number of trials."""
+    tuning, trials = begun(start, vibration(*start), step), 0
+    while not tuning["done"]:
+        next_trial(tuning, vibration(*tuning_place(tuning)), 0.0, stop)
         trials += 1
         assert trials < 500
-    return memory, trials
+    return tuning, trials
 
 
 @pytest.mark.parametrize("error", [(0.17, 0.17), (-0.17, 0.17), (0.1, 0.0), (-0.05, -0.12)])
@@ -157,12 +156,12 @@ def test_the_printed_rule_never_comes_to_rest() -> None:
 
 
 def test_a_move_that_helped_is_tried_again() -> None:
-    memory = begun((0.0, 1.0), 2.0, 0.1)
-    next_trial(memory, 1.95, 0.1, 0.01)
-    assert (tuple(memory["base"]), memory["move"]) == ((0.0, 1.0), 1)
-    next_trial(memory, 1.0, 0.1, 0.01)
-    assert tuple(memory["base"]) == (-0.1, 1.1)
-    assert memory["move"] == 1
+    tuning = begun((0.0, 1.0), 2.0, 0.1)
+    next_trial(tuning, 1.95, 0.1, 0.01)
+    assert (tuple(tuning["base"]), tuning["move"]) == ((0.0, 1.0), 1)
+    next_trial(tuning, 1.0, 0.1, 0.01)
+    assert tuple(tuning["base"]) == (-0.1, 1.1)
+    assert tuning["move"] == 1
 
 
 def test_separation_is_the_shorter_way() -> None:

@@ -9,14 +9,13 @@ from types import SimpleNamespace
 from typing import Any, Literal, Protocol, cast, overload
 
 from ringbalance.controller.algorithms.algorithm import Controller
-from ringbalance.controller.balancer import AS_GIVEN, balancer_of, takes
+from ringbalance.controller.balancer import AS_GIVEN, Progress, balancer_of, takes
 from ringbalance.controller.compare import Comparison
 from ringbalance.controller.compare import compare as run_comparison
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Tuning
-from ringbalance.controller.loop import Progress
 from ringbalance.controller.rotor import Sensor
 from ringbalance.controller.simulation import Simulation
 from ringbalance.interface import checked, law_for, opened

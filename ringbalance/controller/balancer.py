@@ -64,6 +64,11 @@ class Setting:
     lowest: float
     highest: float
 
+    @classmethod
+    def about(cls, path: str, value: float, *, factor: float) -> Setting:
+        """Setting that may change by a factor, up and down."""
+        return cls(path=path, value=value, lowest=value / factor, highest=value * factor)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Draws:
@@ -148,7 +153,8 @@ class RunResult:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outcomes:
-    """Results of runs in the order of the draws: the numbers of `RunResult` as arrays of shape (n,)."""
+    """Results of runs in the order of the draws: the numbers of `RunResult` as arrays of shape (n,), empty
+    where they are NaN for all."""
 
     settling_time: FloatArray
     final_amplitude: FloatArray
@@ -157,16 +163,13 @@ class Outcomes:
     unbalance: FloatArray
     ended: tuple[str, ...]
     numbers: tuple[int, ...] = ()
-    """Numbers of the draws."""
     inputs: Mapping[str, FloatArray] = field(default_factory=dict)
     """Quantiles of every drawn input by its name, in (0, 1); empty where no device is drawn."""
     clipped: Mapping[str, int] = field(default_factory=dict)
     """Number of devices, by input, that cannot have its drawn value."""
     traced: tuple[RunResult, ...] = ()
     crater: FloatArray = field(default_factory=lambda: np.empty(0))
-    """Crater of the gas jet, see `RunResult`; empty, or NaN, without a gas hole."""
     lost: FloatArray = field(default_factory=lambda: np.empty(0))
-    """Part of the liquid that is lost, see `RunResult`; empty, or NaN, where it is not known."""
 
     @property
     def settled(self) -> BoolArray:
@@ -210,7 +213,6 @@ class Outcomes:
 
 
 ARRAYS: Final = ("settling_time", "final_amplitude", "energy", "usable_moment", "unbalance", "crater", "lost")
-"""Names of the arrays of `Outcomes`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -262,7 +264,6 @@ class Balancer(ABC):
     """
 
     scene: Any
-    """Scene of the balancer, of the type of its kind."""
     options: frozenset[str] = frozenset()
     """Names of further arguments besides the scene, such as "flow_law"."""
     verdict_draws: tuple[int, int] = (16, 64)

@@ -6,6 +6,7 @@ import cmath
 import math
 import pickle
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -24,10 +25,8 @@ Check = Callable[[Balancer], Iterator[str]]
 
 
 def _differ(first: Outcomes, second: Outcomes) -> bool:
-    return not all(
-        np.array_equal(getattr(first, name), getattr(second, name))
-        for name in ("settled", "settling_time", "final_amplitude")
-    )
+    names = ("settled", "settling_time", "final_amplitude")
+    return not all(np.array_equal(getattr(first, name), getattr(second, name)) for name in names)
 
 
 def inputs(balancer: Balancer) -> Iterator[str]:
@@ -78,10 +77,8 @@ def repeatable(balancer: Balancer) -> Iterator[str]:
 def numbers(balancer: Balancer) -> Iterator[str]:
     """A number is the same device, alone and among others."""
     several, alone = balancer.run({}, Draws.first(3)), balancer.run({}, Draws(numbers=(2,)))
-    if (several.final_amplitude[2], several.settling_time[2]) != (
-        alone.final_amplitude[0],
-        alone.settling_time[0],
-    ):
+    names = ("final_amplitude", "settling_time")
+    if any(getattr(several, name)[2] != getattr(alone, name)[0] for name in names):
         yield "device 2 ends otherwise alone than after devices 0 and 1"
 
 
@@ -104,16 +101,13 @@ def one_run(balancer: Balancer) -> Iterator[str]:
     outcomes = balancer.run({}, AS_GIVEN, trace=True)
     (traced,) = outcomes.traced
     run, columns = traced.run, balancer.history(traced.run)
-    document = run.to_dict()
-    for key, value in {
-        "balancer": balancer.scene.balancer,
-        "settled": bool(outcomes.settled[0]),
-        "status": run.status,
-    }.items():
+    document, settled = run.to_dict(), bool(outcomes.settled[0])
+    pairs = (("balancer", balancer.scene.balancer), ("settled", settled), ("status", run.status))
+    for key, value in pairs:
         if document.get(key) != value:
             yield f"{key} is {document.get(key)!r} in the document of the run, and {value!r}"
-    if bool(run.settled) != bool(outcomes.settled[0]):
-        yield f"settled is {run.settled} of the run and {outcomes.settled[0]} of its result"
+    if bool(run.settled) != settled:
+        yield f"settled is {run.settled} of the run and {settled} of its result"
     if not run.status:
         yield "the status is empty"
     if not traced.energy >= 0:
@@ -165,11 +159,9 @@ def pickles(balancer: Balancer) -> Iterator[str]:
 
 def options(balancer: Balancer) -> Iterator[str]:
     """An option that it does not have is refused."""
-    try:
+    with suppress(ValueError):
         balancer_of(balancer.scene, colour="red")
-    except ValueError:
-        return
-    yield "colour is taken"
+        yield "colour is taken"
 
 
 def checked_scene(balancer: Balancer) -> Iterator[str]:
@@ -177,11 +169,9 @@ def checked_scene(balancer: Balancer) -> Iterator[str]:
     scene = balancer.scene
     if scene.with_values({"run.seed": 5}).run.seed != 5:
         yield "another run.seed is not taken"
-    try:
+    with suppress(SceneError):
         replace(scene, run=replace(scene.run, seed=6)).with_values({"run.seed": 7})
-    except SceneError:
-        return
-    yield "a changed record is taken"
+        yield "a changed record is taken"
 
 
 def description(balancer: Balancer) -> Iterator[str]:
@@ -237,9 +227,8 @@ class BalancerChecks(Result):
         return not any(problems for _, problems in self.problems)
 
     def _finding(self) -> Finding:
-        failed = sum(bool(problems) for _, problems in self.problems)
         values: dict[str, Any] = {"name": self.name, "count": len(self.problems), "source": self.source}
-        if failed:
+        if failed := sum(bool(problems) for _, problems in self.problems):
             return Finding(code="balancer_unsound", values={**values, "failed": failed})
         return Finding(code="balancer_sound", values=values)
 

@@ -13,11 +13,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.balance_grades import grade_quantities
 from ringbalance.controller.balancer import WATCH_TIME_S
 from ringbalance.controller.liquid_ring.drying import drying
 from ringbalance.controller.liquid_ring.loop_factor import vibration_left
-from ringbalance.controller.simulation import GasUse, Simulation
-from ringbalance.controller.standards import ConventionRow, grade_rows
+from ringbalance.controller.simulation import GasUse, Simulation, noise_floor
 from ringbalance.physics import balancing
 from ringbalance.physics.evaporation import carried_off
 from ringbalance.reduced_model.gas_line import line_document, line_ends, line_text
@@ -52,7 +52,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "outcome": simulation.outcome.value,
         "status": simulation.status,
         "limit_m": simulation.limit,
-        "hold_time_s": simulation.hold_time,
+        "hold_time_s": scene.controller.hold_time,
         "further_time_s": WATCH_TIME_S,
         "loop_factor": simulation.loop.value,
         "loop_factor_limit": simulation.loop.limit,
@@ -95,7 +95,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
             "warning": "" if gas.finding is None else gas.finding.text,
         },
         "gas_line": line_document(simulation.gas_line),
-        "noise_floor_m": simulation.noise_floor,
+        "noise_floor_m": noise_floor(scene),
         "samples": {
             "time_s": [sample.time for sample in simulation.samples],
             "amplitude_m": [None if each is None else finite(each.amplitude) for each in measurements],
@@ -103,7 +103,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
             "resting": [sample.command.resting for sample in simulation.samples],
         },
         "terms_modelled": list(simulation.terms_modelled),
-        "tolerance": simulation.tolerance,
+        "tolerance": scene.tolerance,
         "models_used": [asdict(used) for used in simulation.models_used],
         "neglected": asdict(neglected_in_injections(simulation.models_used)),
         "conventions": [each.document() for each in conventions(simulation)],
@@ -149,11 +149,7 @@ _DECADES: Final = 3.0
 
 def simulation_rows(simulation: Simulation) -> Rows:
     """Quantities, findings, injections and terms of a run."""
-    gas = simulation.gas.finding
-    scene = simulation.scene
-    model = simulation.model_status
-    neglected = neglected_in_injections(simulation.models_used).text
-
+    scene, gas, model = simulation.scene, simulation.gas.finding, simulation.model_status
     injections = []
     for each in simulation.injections[:_MOST_INJECTIONS]:
         regimes = " to ".join(dict.fromkeys((each.regime_start.label, each.regime_end.label)))
@@ -176,7 +172,7 @@ def simulation_rows(simulation: Simulation) -> Rows:
         facts=(
             ("flow law", simulation.law),
             ("gas line", line_text(simulation.gas_line)),
-            ("neglected", neglected),
+            ("neglected", neglected_in_injections(simulation.models_used).text),
             ("amplitude (log)", amplitude_line(simulation.time, simulation.amplitude, end=end)),
         ),
         tables=(
@@ -191,7 +187,7 @@ def simulation_rows(simulation: Simulation) -> Rows:
                 heads=("quantity", "value"),
                 rows=[(each.name, plain(each.text)) for each in conventions(simulation)],
             ),
-            models_table(simulation.models_used, tolerance=simulation.tolerance),
+            models_table(simulation.models_used, tolerance=scene.tolerance),
         ),
     )
 
@@ -203,13 +199,8 @@ def _quantities(simulation: Simulation) -> tuple[Quantity, ...]:
         ("settling_time", "settling time", "s", simulation.settling_time),
         ("initial_amplitude", "amplitude before", "m", float(simulation.amplitude[0])),
         ("final_amplitude", "amplitude at the end", "m", float(simulation.amplitude[-1])),
-        *(
-            [("final_reading", "reading at the end, without noise", "m", float(simulation.reading[-1]))]
-            if _has_runout(simulation)
-            else []
-        ),
         ("limit", "limit", "m", simulation.limit),
-        ("hold_time", "hold time", "s", simulation.hold_time),
+        ("hold_time", "hold time", "s", simulation.scene.controller.hold_time),
         ("loop_factor", "loop factor", "1", loop.value),
         ("loop_factor_limit", "loop factor, at most", "1", loop.limit),
         ("stationary_deviation", "standard deviation that noise leaves", "m", finite(loop.deviation)),
@@ -220,11 +211,11 @@ def _quantities(simulation: Simulation) -> tuple[Quantity, ...]:
         ("compression_energy", "compression of the gas", "J", gas.energy),
         ("overshoots", "overshoots", "1", simulation.overshoots),
         ("misadjustments", "misadjustments", "1", simulation.misadjustments),
-        *(
-            (f"fill_ratio_{letter}", f"fill ratio of {letter}", "1", float(fill[-1]))
-            for letter, fill in fills
-        ),
+        *((f"fill_ratio_{at}", f"fill ratio of {at}", "1", float(fill[-1])) for at, fill in fills),
     ]
+    if _has_runout(simulation):
+        reading = float(simulation.reading[-1])
+        rows.insert(3, ("final_reading", "reading at the end, without noise", "m", reading))
     origins = {"limit": "given", "hold_time": "given"}
     return tuple(
         Quantity(key=key, name=name, unit=unit, value=value, origin=origins.get(key, "simulated"))
@@ -308,27 +299,19 @@ CONSUMPTION: Final = ("gas_per_hour", "liquid_per_hour", "liquid_part_per_hour",
 """Keys of `conventions` that say what holding the balance takes."""
 
 
-def conventions(run: Simulation) -> tuple[Quantity, ...]:
+def conventions(run: Simulation) -> Iterator[Quantity]:
     """Unbalances and vibrations of the run as ISO 21940 and ISO 20816 name them, the loop's peak sensitivity,
     gas used, and lowest speed at which the correction lasts without gas.
     """
-    return tuple(
-        Quantity(key=key, name=name, value=value, unit=unit, origin="simulated", status=status, digits=3)
-        for key, name, value, unit, status in _convention_rows(run)
-    )
-
-
-def _convention_rows(run: Simulation) -> Iterator[ConventionRow]:
-    """Key, name, value, unit and status of each quantity."""
     scene, before, after = run.scene, float(run.amplitude[0]), float(run.amplitude[-1])
     rotor, grade = scene.rotor, scene.requirement.grade
     influence = rotor.influence_coefficient
-    yield "residual_unbalance", "residual unbalance at the end", after / influence, "kg m", "ok"
+    yield Quantity.simulated("residual_unbalance", "residual unbalance at the end", after / influence, "kg m")
     if grade is not None and rotor.mass is not None:
         permissible = permissible_unbalance(grade=grade, mass=rotor.mass, speed=rotor.speed)
         name = "permissible residual unbalance (ISO 21940-11)"
-        yield "permissible_unbalance", name, permissible, "kg m", "ok"
-    yield from grade_rows(
+        yield Quantity.simulated("permissible_unbalance", name, permissible, "kg m")
+    yield from grade_quantities(
         mass=rotor.mass,
         speed=rotor.speed,
         residual=after / influence,
@@ -339,37 +322,31 @@ def _convention_rows(run: Simulation) -> Iterator[ConventionRow]:
     starts = sorted({each.time for each in run.injections if each.moved})
     ends = [float(np.interp(each, run.time, run.amplitude)) for each in (*starts, math.inf)[:2]]
     for key, name, two in (
-        (
-            "unbalance_reduction_ratio",
-            "unbalance reduction ratio (ISO 21940-21), first correction",
-            ends,
-        ),
+        ("unbalance_reduction_ratio", "unbalance reduction ratio (ISO 21940-21), first correction", ends),
         ("unbalance_reduction", "reduction of the unbalance over the whole run", [before, after]),
     ):
-        ratio = (
-            balancing.unbalance_reduction_ratio(before=two[0], after=two[1])
-            if len(two) == 2 and two[0] > 0
-            else None
-        )
-        yield key, name, ratio, "1", "ok"
+        ratio = None
+        if len(two) == 2 and two[0] > 0:
+            ratio = balancing.unbalance_reduction_ratio(before=two[0], after=two[1])
+        yield Quantity.simulated(key, name, ratio, "1")
     vibration = vibration_left(scene, run.loop)
     left = None if vibration is None else vibration / influence
     name = "unbalance that noise leaves at most with this run's settings"
-    yield "unbalance_left", name, left, "kg m", "ok"
+    yield Quantity.simulated("unbalance_left", name, left, "kg m")
     for key, when, amplitude in (("initial", "before", before), ("final", "at the end", after)):
         velocity = balancing.rms_velocity(amplitude=amplitude, speed=rotor.speed)
-        yield f"{key}_peak_to_peak", f"vibration {when}, peak to peak", 2 * amplitude, "m", "ok"
-        yield f"{key}_velocity", f"vibration {when}, velocity, rms", velocity, "m/s", "ok"
+        yield Quantity.simulated(f"{key}_peak_to_peak", f"vibration {when}, peak to peak", 2 * amplitude, "m")
+        yield Quantity.simulated(f"{key}_velocity", f"vibration {when}, velocity, rms", velocity, "m/s")
     margins = run.loop.margins if run.loop.fixed else None
     if margins is not None and margins.stable:
         peak = margins.sensitivity_peak
         name = f"peak sensitivity of the proportional part (zone {balancing.zone(peak)} of ISO 14839-3)"
-        yield "peak_sensitivity", name, peak, "1", "ok"
+        yield Quantity.simulated("peak_sensitivity", name, peak, "1")
     yield from _consumption_rows(run)
     yield from _lasting_rows(run)
 
 
-def _consumption_rows(run: Simulation) -> Iterator[ConventionRow]:
+def _consumption_rows(run: Simulation) -> Iterator[Quantity]:
     """Time of the first correction, and the gas and the liquid that corrections and holding take."""
     first = min((each.time + each.duration for each in run.injections if each.moved), default=None)
     corrections = len({each.time for each in run.injections})
@@ -380,21 +357,27 @@ def _consumption_rows(run: Simulation) -> Iterator[ConventionRow]:
         later = [each for each in run.injections if each.time > since]
         used = GasUse.of(scene=run.scene, model=run.model, injections=later, time=span)
         hourly = used.normal_volume / span * _HOUR_S
-    yield "first_correction", "first correction made after", first, "s", "ok"
-    yield "gas_per_correction", "gas per correction, normal volume", per_correction, "m^3", "ok"
-    yield "gas_per_hour", "gas per hour to hold it, normal volume", hourly, "m^3", "ok"
+    yield Quantity.simulated("first_correction", "first correction made after", first, "s")
+    yield Quantity.simulated("gas_per_correction", "gas per correction, normal volume", per_correction, "m^3")
+    yield Quantity.simulated("gas_per_hour", "gas per hour to hold it, normal volume", hourly, "m^3")
     each, loss = carried_off(run.scene), drying(run, used, span=span)
     code = "ok" if each is not None else "not_known"
     taken = None if each is None or not corrections else each * (run.gas.normal_volume - run.gas.leaked)
     per_correction = None if taken is None else taken / corrections
-    yield "liquid_per_correction", "liquid that gas takes per correction", per_correction, "kg", code
-    yield "liquid_per_hour", "liquid that gas takes per hour to hold it, at most", loss.per_hour, "kg", code
-    yield "liquid_part_per_hour", "part of all liquid, per hour, at most", loss.part_per_hour, "1", code
+    yield Quantity.simulated(
+        "liquid_per_correction", "liquid that gas takes per correction", per_correction, "kg", code
+    )
+    yield Quantity.simulated(
+        "liquid_per_hour", "liquid that gas takes per hour to hold it, at most", loss.per_hour, "kg", code
+    )
+    yield Quantity.simulated(
+        "liquid_part_per_hour", "part of all liquid, per hour, at most", loss.part_per_hour, "1", code
+    )
     name = "holding until the lost liquid is missing for the initial unbalance"
-    yield "holding_time", name, loss.holding_time, "s", code
+    yield Quantity.simulated("holding_time", name, loss.holding_time, "s", code)
 
 
-def _lasting_rows(run: Simulation) -> Iterator[ConventionRow]:
+def _lasting_rows(run: Simulation) -> Iterator[Quantity]:
     """Speeds down to which a correction lasts without gas, by hydrostatics.
 
     Down to the lowest speeds the fullest chamber keeps its liquid with the gas off: to the first at any
@@ -408,11 +391,13 @@ def _lasting_rows(run: Simulation) -> Iterator[ConventionRow]:
         ("likely_lasting_speed", "perhaps", held.likely_speed),
     ):
         name = f"correction lasts without gas, {how_sure} down to"
-        yield key, name, speed, "rad/s", "ok" if speed is not None else status
+        yield Quantity.simulated(key, name, speed, "rad/s", "ok" if speed is not None else status)
     level = Holding.of(run.scene, fill_ratio=run.scene.disc.initial_fill)
     for key, how_sure, lasting, speed in (
         ("levelled_speed", "perhaps", held.sure_speed, level.sure_speed),
         ("likely_levelled_speed", "as runs assume", held.likely_speed, level.likely_speed),
     ):
         name = f"slow run-down levels opposite chambers, {how_sure} at"
-        yield key, name, None if lasting is None else speed, "rad/s", "ok" if lasting is not None else status
+        yield Quantity.simulated(
+            key, name, None if lasting is None else speed, "rad/s", "ok" if lasting is not None else status
+        )

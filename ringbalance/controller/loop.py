@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Final
@@ -12,6 +12,7 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement
 from ringbalance.controller.algorithms.built_in import BuiltIn, command_of, show
 from ringbalance.controller.algorithms.law_based import controller_of
+from ringbalance.controller.balancer import Progress
 from ringbalance.controller.document import command_document, simulation_history, simulation_rows
 from ringbalance.controller.liquid_ring.loop_factor import loop_factor
 from ringbalance.controller.liquid_ring.plant import LiquidRing
@@ -28,11 +29,7 @@ from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.results.result import Presentation
 from ringbalance.scene.models import Scene
 
-Progress = Callable[[float, float], None]
-"""Called with the simulated time and the time limit, s."""
-
-MAX_SAMPLES: Final = 10_000
-"""Largest number of samples of a run whose trace is kept."""
+_MAX_TRACED_SAMPLES: Final = 10_000
 
 
 def simulate(
@@ -76,7 +73,7 @@ def simulate(
     loop = loop_factor(scene, model, algorithm)
     sensed = sensor is not None
     plan = LoopPlan.of(
-        [scene], [algorithm], most_samples=MAX_SAMPLES, sensed=sensed, to_time_limit=to_time_limit
+        [scene], [algorithm], most_samples=_MAX_TRACED_SAMPLES, sensed=sensed, to_time_limit=to_time_limit
     )
     total = 2 * scene.disc.initial_fill
     plant = dynamics.plant(total=total, relative_error=RELATIVE_ERROR)
@@ -102,7 +99,7 @@ def simulate(
             outside.answer(runs[0])
 
     random = noise or np.random.default_rng(scene.run.seed)
-    deviations = random.standard_normal((1, MAX_SAMPLES, 2))
+    deviations = random.standard_normal((1, _MAX_TRACED_SAMPLES, 2))
     watched = progress is not None or outside is not None
     trace = plan.carry(runs, plant, lambda _: deviations, traced=True, watch=watch if watched else None)
     positive = trace.instants[:, 1:].T

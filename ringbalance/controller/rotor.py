@@ -11,9 +11,9 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from string import ascii_uppercase
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -138,12 +138,6 @@ _COMPARED_DEVICES: Final = 16
 """Devices that show which of the scenes draws a quantity more widely."""
 
 
-class _Drawn(Protocol):
-    """Type of `Balancer.rotor`."""
-
-    def __call__(self, number: int | None = None) -> CommonRotor: ...
-
-
 _ALIKE: Final = 0.01
 """Relative difference of speed, alpha and U_0 up to which two scenes describe one rotor: files state these to
 two or three digits, and a balancing run leaves more of a vibration than so small a difference makes."""
@@ -175,18 +169,18 @@ def joined_rotor(rotor: CommonRotor, other: CommonRotor) -> CommonRotor:
     )
 
 
-def rotors_of(nominal: CommonRotor, *scenes: _Drawn) -> Rotors:
+def rotors_of(nominal: CommonRotor, *scenes: Callable[..., CommonRotor]) -> Rotors:
     """Rotors of drawn devices, each quantity drawn as in the scene that draws it most widely.
 
     These quantities are speed, magnitude and angle of alpha, and size and direction of the unbalance; the
-    order of the scenes does not change their deviations.
+    order of the scenes does not change their deviations.  Args: `scenes`: `Balancer.rotor` of each.
     """
     deviations = []
     for scene in scenes:
         with suppress(SceneError):
             # A scene whose rotor stands still or does not vibrate is left out.
             if (described := scene()).amplitude > 0.0:
-                deviations.append(_deviations(described, scene))
+                deviations.append(partial(_deviations, described, scene))
     spread = np.array([np.std([of(n) for n in range(_COMPARED_DEVICES)], axis=0) for of in deviations])
     wider = np.argmax(spread, axis=0)
 
@@ -203,19 +197,15 @@ def rotors_of(nominal: CommonRotor, *scenes: _Drawn) -> Rotors:
     return cache(rotor)
 
 
-def _deviations(nominal: CommonRotor, rotor_of: _Drawn) -> Callable[[int], list[float]]:
-    """Deviations of a device's rotor by number: logarithms of ratios to the scene's values, and angles."""
-
-    def of(number: int) -> list[float]:
-        rotor = rotor_of(number)
-        influence, unbalance = rotor.influence / nominal.influence, rotor.unbalance / nominal.unbalance
-        return [
-            math.log(rotor.speed / nominal.speed),
-            *(math.log(abs(influence)), cmath.phase(influence)),
-            *(math.log(abs(unbalance)), cmath.phase(unbalance)),
-        ]
-
-    return of
+def _deviations(nominal: CommonRotor, rotor_of: Callable[..., CommonRotor], number: int) -> list[float]:
+    """Deviations of a device's rotor: logarithms of ratios to the scene's values, and angles."""
+    rotor = rotor_of(number)
+    influence, unbalance = rotor.influence / nominal.influence, rotor.unbalance / nominal.unbalance
+    return [
+        math.log(rotor.speed / nominal.speed),
+        *(math.log(abs(influence)), cmath.phase(influence)),
+        *(math.log(abs(unbalance)), cmath.phase(unbalance)),
+    ]
 
 
 def rotor_fault(scene: SceneFile, path: str, problem: str, allowed: str) -> SceneError:

@@ -230,7 +230,6 @@ class Simulation(PresentedResult):
     as_scene: bool
     """True if algorithm and sensor are those of the scene."""
     loop: LoopFactor
-    """The loop about the balanced state."""
     findings: tuple[Finding, ...] = ()
     """Findings on how the run ended, why, and what to do next."""
     time: FloatArray
@@ -329,7 +328,7 @@ class Simulation(PresentedResult):
             return Outcome.CAPACITY_EXCEEDED
         if state["drains"]:
             return Outcome.DRIFTING
-        higher = self.reading[-1] > self.reading[0] + self.noise_floor
+        higher = self.reading[-1] > self.reading[0] + noise_floor(self.scene)
         if cause == RISING or (cause == IDLE and higher):
             return Outcome.DRIFTING if state["drift"] > NOTICEABLE_CHANGE else Outcome.DIVERGING
         if self.loop.unstable:
@@ -407,16 +406,6 @@ class Simulation(PresentedResult):
         return self.outcome is Outcome.SETTLED
 
     @property
-    def hold_time(self) -> float:
-        """Time for which the amplitude must hold within the limit, s."""
-        return self.scene.controller.hold_time
-
-    @property
-    def noise_floor(self) -> float:
-        """Rise of the amplitude between two samples that noise alone does not explain, m."""
-        return noise_floor(self.scene)
-
-    @property
     def energy(self) -> float:
         """Work of the driving gas against the surroundings over all injections, J."""
         return math.fsum(injection.energy for injection in self.injections)
@@ -430,11 +419,6 @@ class Simulation(PresentedResult):
     def limit(self) -> float:
         """Amplitude to come below, m."""
         return self.scene.controller.limit
-
-    @property
-    def tolerance(self) -> float:
-        """Tolerance at which the models were selected."""
-        return self.scene.tolerance
 
     @cached_property
     def gas(self) -> GasUse:

@@ -9,13 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any, Final
+
+import numpy as np
 
 from ringbalance.results.result import Facts
 from ringbalance.results.rows import Finding, Quantity
 
 Point = Mapping[str, float]
 """Level by name of the axis."""
+Indices = tuple[float, ...]
+"""Index of a level on each axis; a fraction between levels."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +34,6 @@ class SearchAxis:
     first: tuple[int, ...]
     """Indices of the levels that are tried first; the neighbours of the best follow."""
     unit: str = "1"
-    """SI unit of the levels."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +51,33 @@ class Trials:
     scan_axis: SearchAxis | None = None
     """Axis, such as the supply's pressure, that is searched only where the others do not suffice, or on
     request, with a result at every level; a point without it is at the scene's level."""
+
+    @property
+    def first(self) -> list[Indices]:
+        """Coarse grid of the levels that are tried first."""
+        return list(product(*(axis.first for axis in self.axes)))
+
+    def neighbours(self, indices: Indices, step: float = 1) -> list[Indices]:
+        """Indices within the axes that are a step away on one axis."""
+        return [
+            (*indices[:axis], index + by, *indices[axis + 1 :])
+            for axis, index in enumerate(indices)
+            for by in (-step, step)
+            if 0 <= index + by <= len(self.axes[axis].levels) - 1
+        ]
+
+    def at(self, indices: Indices, scan_level: float | None = None) -> Mapping[str, Any] | None:
+        """Settings at levels, between them by interpolation; None: there are none.
+
+        Args: `scan_level`: level on the scan axis; default the scene's.
+        """
+        pairs = zip(self.axes, indices, strict=True)
+        point = {
+            axis.name: float(np.interp(index, range(len(axis.levels)), axis.levels)) for axis, index in pairs
+        }
+        if scan_level is not None and self.scan_axis is not None:
+            point[self.scan_axis.name] = scan_level
+        return self.settings(point)
 
 
 def rounded(value: float, digits: int = 3) -> float:

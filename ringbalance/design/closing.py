@@ -16,7 +16,7 @@ from scipy.special import expit, logit, ndtr
 
 from ringbalance.controller.balancer import Settings
 from ringbalance.design.hunt import Hunt
-from ringbalance.design.races import Points, RacedDesign, Races, deal
+from ringbalance.design.races import RacedDesign, Races, WorkablePoint, deal
 from ringbalance.design.racing import Race, judged_design, tuned_settings
 from ringbalance.scene.arrays import FloatArray
 
@@ -59,12 +59,12 @@ def judged_designs(hunt: Hunt) -> list[RacedDesign]:
     settings: Settings | None = None
     for round_number in range(_MAX_ROUNDS):
         smallest = min((each.size for each in judged if each.race.succeeded), default=math.inf)
-        points, sizes, logits, sigmas = _most_promising_by_size(races, size, below=smallest / (1 + AS_SMALL))
+        points, logits, sigmas = _most_promising_by_size(races, size, below=smallest / (1 + AS_SMALL))
         limit = min(smallest, _FIRST_LIMIT * size)
         p_met = ndtr((logits - logit(races.threshold)) / (_SIGMA_FACTOR * sigmas))
-        gains = p_met * np.log(limit / sizes)
+        gains = p_met * np.log(limit / np.array([each.size for each in points]))
         two = np.lexsort((-logits, -np.maximum(gains, _MIN_GAIN)))[:2]
-        chosen = points.some(two.tolist())
+        chosen = [points[i] for i in two]
         if not (gains[two] > _MIN_GAIN).any():
             if math.isfinite(smallest):
                 break
@@ -73,22 +73,21 @@ def judged_designs(hunt: Hunt) -> list[RacedDesign]:
                 size *= _FIRST_LIMIT
                 continue
             # No design promises to meet the requirement: judge the two that came nearest.
-            order = sorted(range(len(races.candidates)), key=lambda i: races.candidates[i].race.order)
-            chosen = races.points.some(order[:2])
+            chosen = [*sorted(races.candidates, key=lambda each: each.race.order)[:2]]
         if round_number == 0 and not races.space.sets_controller:
             races.report_progress("settings of the designs that are judged")
-            (settings,) = deal(races.executor, [partial(tuned_settings, races.space.hasty, chosen.points[0])])
+            (settings,) = deal(races.executor, [partial(tuned_settings, races.space.hasty, chosen[0].point)])
         races.report_progress(f"judging designs {len(judged) + 1} and on, about {1e6 * size:.4g} ml")
-        grid_points = races.nearest_grid_points(chosen.shares)
+        grid_points = races.nearest_grid_points(chosen)
         calls = [
-            partial(judged_design, races.space.hasty, point, grid_point=grid_point, settings=settings)
-            for point, grid_point in zip(chosen.points, grid_points, strict=True)
+            partial(judged_design, races.space.hasty, each.point, grid_point=grid_point, settings=settings)
+            for each, grid_point in zip(chosen, grid_points, strict=True)
         ]
-        for i, judgement in enumerate(deal(races.executor, calls)):
+        for each, grid_point, judgement in zip(chosen, grid_points, deal(races.executor, calls), strict=True):
             if judgement is not None:
-                judged.append(races.add(chosen, i, Race(grid_point=grid_points[i], judgement=judgement)))
+                judged.append(races.add(each, Race(grid_point=grid_point, judgement=judgement)))
         # Designs that missed at a small size say nothing against the expected one.
-        largest = max(size, *(races.space.size(point) for point in chosen.points))
+        largest = max(size, *(each.size for each in chosen))
         size = min((each.size for each in judged if each.race.succeeded), default=largest)
     return _sharpened(races, judged)
 
@@ -110,13 +109,13 @@ def _sharpened(races: Races, judged: list[RacedDesign]) -> list[RacedDesign]:
         return judged
     points = races.able(np.array([races.space.sized_at(near.shares, each) for each in sizes]))
     # Sizes in a drawing have few digits: both may be one.
-    points = points.some([i for i, each in enumerate(points.points) if each not in points.points[:i]])
+    points = [each for i, each in enumerate(points) if each.point not in [p.point for p in points[:i]]]
     races.report_progress(f"judging designs {len(judged) + 1} and on, about {1e6 * sizes[0]:.4g} ml")
     judge = partial(judged_design, races.space.hasty, settings=near.race.judgement.settings)
-    for i, judgement in enumerate(deal(races.executor, [partial(judge, each) for each in points.points])):
+    judgements = deal(races.executor, [partial(judge, each.point) for each in points])
+    for each, judgement in zip(points, judgements, strict=True):
         if judgement is not None:
-            race = Race(grid_point=near.race.grid_point, judgement=judgement)
-            judged.append(races.add(points, i, race))
+            judged.append(races.add(each, replace(near.race, judgement=judgement)))
     return judged
 
 
@@ -130,15 +129,7 @@ def enlarged(races: Races, design: RacedDesign, fraction: float) -> RacedDesign 
         return None
     size = max(_size_with(races.threshold, design, fraction, slope), (1 + AS_SMALL / 2) * design.size)
     points = races.able(races.space.sized_at(design.shares, size)[np.newaxis])
-    if not points.points or races.space.size(points.points[0]) <= design.size:
-        return None
-    return replace(
-        design,
-        shares=points.shares[0],
-        reach=float(points.reach[0]),
-        point=points.points[0],
-        size=races.space.size(points.points[0]),
-    )
+    return replace(design, **vars(points[0])) if points and points[0].size > design.size else None
 
 
 def growth(races: Races, best: RacedDesign) -> float:
@@ -148,7 +139,7 @@ def growth(races: Races, best: RacedDesign) -> float:
     ends = best.size * np.array([1.0, _GROWTH_FACTOR])
     points = races.able(np.array([races.space.sized_at(best.shares, size) for size in ends]))
     fractions = expit(races.surface().logits(races.coordinates(points))[0])
-    sizes = [races.space.size(each) for each in points.points]
+    sizes = [each.size for each in points]
     return float(np.diff(fractions)[0]) / math.log(sizes[1] / sizes[0]) if len(set(sizes)) == 2 else 0.0
 
 
@@ -159,33 +150,32 @@ def _size_with(required: float, design: RacedDesign, fraction: float, slope: flo
 
 def _most_promising_by_size(
     races: Races, size: float, *, below: float
-) -> tuple[Points, FloatArray, FloatArray, FloatArray]:
+) -> tuple[list[WorkablePoint], FloatArray, FloatArray]:
     """Draw points of every size, in equal steps, and keep the most promising of each size.
 
-    Returns: Points, their sizes, m^3, the logits of their fractions by the surface, and the standard
-        deviations of these.
+    Returns: Points, the logits of their fractions by the surface, and the standard deviations of these.
     """
     surface = races.surface()
     steps = size * (1 + AS_SMALL) ** np.arange(*_SIZE_STEPS)
     steps = steps[steps <= below]
     nothing = np.zeros(0)
     if not steps.size:
-        return races.points.some([]), nothing, nothing, nothing
+        return [], nothing, nothing
     parents = races.parents(lambda points: surface.logits(races.coordinates(points))[0], size)
-    points = races.points.some([])
+    points: list[WorkablePoint] = []
     for step in _STEP_SIGMAS:
-        points = points.joined(races.cloud(parents, step, np.repeat(steps, _POINTS_PER_SIZE)))
-        sizes = np.array([races.space.size(point) for point in points.points])
+        points += races.cloud(parents, step, np.repeat(steps, _POINTS_PER_SIZE))
+        sizes = np.array([each.size for each in points])
         if not (sizes <= below).any():
-            return points.some([]), nothing, nothing, nothing
+            return [], nothing, nothing
         logits, sigmas = surface.logits(races.coordinates(points))
         best = [
             max(np.flatnonzero(sizes == each).tolist(), key=lambda i: logits[i])
             for each in np.unique(sizes[sizes <= below])
         ]
-        points, sizes, logits, sigmas = points.some(best), sizes[best], logits[best], sigmas[best]
-        parents = points.shares
-    return points, sizes, logits, sigmas
+        points, logits, sigmas = [points[i] for i in best], logits[best], sigmas[best]
+        parents = np.array([each.shares for each in points])
+    return points, logits, sigmas
 
 
 def _judge_listed(hunt: Hunt) -> list[RacedDesign]:
@@ -196,7 +186,7 @@ def _judge_listed(hunt: Hunt) -> list[RacedDesign]:
     """
     races = hunt.races
     sized, enough = races.space.sized, float(logit(races.threshold))
-    logits = races.surface().logits(races.coordinates(races.points))[0]
+    logits = races.surface().logits(races.coordinates(races.candidates))[0]
     order = sorted(range(len(logits)), key=lambda i: (races.candidates[i].size, races.candidates[i].race.gas))
     listed: list[int] = []
     if sized:
@@ -223,8 +213,7 @@ def _judge_listed(hunt: Hunt) -> list[RacedDesign]:
         for i, judgement in zip(new, deal(races.executor, calls), strict=True):
             judged[i] = None
             if judgement is not None:
-                race = Race(grid_point=designs[i].race.grid_point, judgement=judgement)
-                judged[i] = replace(designs[i], race=race)
+                judged[i] = replace(designs[i], race=replace(designs[i].race, judgement=judgement))
         return [i for i, each in judged.items() if each is not None and each.race.succeeded]
 
     top = 0

@@ -72,9 +72,8 @@ def design_document(design: Design) -> dict[str, Any]:
         "reach_kg_m": design.reach,
         "size_m3": None if judgement is None else design.size,
         "size_uncertainty": design.doubt,
-        "smaller": None
-        if design.smaller is None
-        else {"size_m3": design.smaller[0], "fraction": design.smaller[1].document()},
+        "smaller": design.smaller
+        and {"size_m3": design.smaller[0], "fraction": design.smaller[1].document()},
         "parts": design.space.names(design.point) if judgement else {},
         "changes": plain_settings(design.point) if judgement else {},
         "settings": plain_settings(judgement.settings) if judgement else {},
@@ -118,15 +117,9 @@ def _quantities(design: Design) -> Iterator[Quantity]:
         name = "devices that meet what is required"
         yield Quantity.of_fraction(judgement.fraction, key="fraction_met", name=name)
         yield from reported_quantities(judgement)
-        yield Quantity(
-            key="size", name="cylinder around the chambers", value=design.size, unit="m^3", digits=4
-        )
-        yield Quantity(
-            key="reach", name="cancels in any direction", value=design.reach, unit="kg m", digits=4
-        )
-    yield Quantity(
-        key="needed_unbalance", name="initial unbalance", value=design.needed, unit="kg m", digits=4
-    )
+        yield Quantity(key="size", name="cylinder around the chambers", value=design.size, unit="m^3")
+        yield Quantity(key="reach", name="cancels in any direction", value=design.reach, unit="kg m")
+    yield Quantity(key="needed_unbalance", name="initial unbalance", value=design.needed, unit="kg m")
 
 
 def verdict_findings(scene: SceneFile, point: Point, judgement: Judgement) -> Iterator[Finding]:

@@ -39,7 +39,6 @@ PRESSURE: Final = "gas.pressure"
 _MOVE_FRACTION: Final = 0.05
 """Relative change of a key, up and down, for its effect."""
 _EFFECT_DEVICES: Final = 256
-"""Number of devices on which the effect of a changed key is computed."""
 _MAX_VERDICTS: Final = 3
 """Largest number of designs, in order of size, that are judged on devices that selected no design."""
 _MAX_FRONT: Final = 6
@@ -144,16 +143,6 @@ def _in_order(space: Space, designs: Sequence[RacedDesign], needed: float) -> li
     return [designs[i] for i in order]
 
 
-def _size_half_width(fraction: Proportion, rise: float) -> float | None:
-    """Relative half-width (95 %) of a design's size, None where the fraction does not grow with it.
-
-    Half-width of the difference of two fractions over `rise`, their growth with the logarithm of the size,
-    and the resolution of the search.
-    """
-    apart = (fraction.high - fraction.low) / math.sqrt(2.0)
-    return math.hypot(apart / rise, AS_SMALL) if rise > 0 else None
-
-
 def run_design(
     scene: SceneFile,
     *,
@@ -213,7 +202,11 @@ def run_design(
             if larger is not None and (not queue or larger.size < queue[0].size):
                 queue.insert(0, larger)
         if best is not None and space.sized:
-            doubt = _size_half_width(best.race.judgement.fraction, growth(races, best))
+            # Half-width of the difference of two fractions over their growth with the logarithm of the size,
+            # and the resolution of the search.
+            fraction, slope = best.race.judgement.fraction, growth(races, best)
+            apart = (fraction.high - fraction.low) / math.sqrt(2.0)
+            doubt = math.hypot(apart / slope, AS_SMALL) if slope > 0 else None
     reach, smaller, ranking, held = None, None, Ranking(), None
     if best is not None:
         reach = row_reach(static_rows(space.scene, [best.point], intervals=False)[0])
@@ -294,7 +287,7 @@ def _front(races: Races, required_fraction: float, best: RacedDesign) -> tuple[R
     Args: `best`: design with the verdict; smaller ones are left out, which met the requirements on few
         devices only.
     """
-    promises = races.surface().logits(races.coordinates(races.points))[0]
+    promises = races.surface().logits(races.coordinates(races.candidates))[0]
     pairs = sorted(zip(races.candidates, promises, strict=True), key=lambda row: row[0].size)
     passing = [
         each

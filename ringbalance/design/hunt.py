@@ -12,6 +12,7 @@ time, so that a scene gives the same design on every machine.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -24,7 +25,7 @@ from scipy.special import logit
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.design.axes import Point
-from ringbalance.design.races import Points, RacedDesign, Races, ReportProgress, threshold
+from ringbalance.design.races import RacedDesign, Races, ReportProgress, WorkablePoint, threshold
 from ringbalance.design.space import Space
 from ringbalance.design.static import row_reach
 from ringbalance.design.surface import Surface
@@ -80,7 +81,6 @@ class Static:
     reach: float
     """Largest unbalance that any point cancels in every direction, kg m; NaN: no point has a flow."""
     reach_point: Point
-    """Point with the largest reach."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,23 +156,21 @@ def _race_first_sample(races: Races) -> tuple[Static, bool]:
     points = space.points(shares)
     rows = races.answered(points)
     able = races.able(shares, rows)
-    races.wide = able.shares
-    order = sorted(range(len(able.points)), key=lambda i: space.size(able.points[i]))
-    if complete:
-        chosen = able.some(order)
-    else:
-        rest = order[_FIRST_SMALLEST:]
+    races.wide = np.array([each.shares for each in able])
+    chosen = sorted(able, key=lambda each: each.size)
+    if not complete:
+        rest = chosen[_FIRST_SMALLEST:]
         spread = np.linspace(0, len(rest) - 1, min(_FIRST_SPREAD, len(rest))).astype(int)
-        chosen = able.some(order[:_FIRST_SMALLEST] + [rest[i] for i in spread])
-    races.report_progress(f"{len(chosen.points)} of {len(order)} designs that can work, few devices each")
-    races.race(chosen, [None] * len(chosen.points))
+        chosen = chosen[:_FIRST_SMALLEST] + [rest[i] for i in spread]
+    races.report_progress(f"{len(chosen)} of {len(able)} designs that can work, few devices each")
+    races.race(chosen, [None] * len(chosen))
     reach = [(row_reach(row) or 0.0) * (row["status"] == "ok") for row in rows]
     best = int(np.argmax(reach))
     static = Static(
         points=len(points),
         refusals=tuple(row["finding"]["values"]["text"] for row in rows if not row["sha256"]),
         blocked=sum(row["status"] == "blocked" for row in rows),
-        able=len(order),
+        able=len(able),
         reach=reach[best] or math.nan,
         reach_point=points[best],
     )
@@ -191,18 +189,18 @@ def _race_round(races: Races, size: float, index: int) -> float:
     sizes = size * np.exp(np.linspace(math.log(low), math.log(high), count))
     parents = races.parents(promise, size)
     points = races.cloud(parents, _STEP_SIGMAS[index], sizes, anywhere=_ANYWHERE_SHARES[index])
-    if points.points:
+    if points:
         values = promise(points)
         slices = np.array_split(np.arange(values.size), min(_RACES_PER_ROUND, values.size))
-        chosen = points.some([int(each[np.argmax(values[each])]) for each in slices])
-        races.race(chosen, races.grid_points(chosen.shares))
-    logits, sigmas = races.surface().logits(races.coordinates(races.points))
+        chosen = [points[each[np.argmax(values[each])]] for each in slices]
+        races.race(chosen, races.grid_points(chosen))
+    logits, sigmas = races.surface().logits(races.coordinates(races.candidates))
     enough = logits - _DOUBT_SIGMA * sigmas >= logit(races.threshold)
     smallest = min((races.candidates[i].size for i in np.flatnonzero(enough)), default=math.inf)
     return min(max(smallest, low * size), high * size)
 
 
-def _promise(races: Races, surface: Surface, points: Points) -> FloatArray:
+def _promise(races: Races, surface: Surface, points: Sequence[WorkablePoint]) -> FloatArray:
     """Logit of the fraction of devices plus part of its standard deviation; for discs of one size, the gas.
 
     Points that may serve enough devices rank by gas, above all others.
@@ -214,6 +212,6 @@ def _promise(races: Races, surface: Surface, points: Points) -> FloatArray:
         return hoped
     energy = np.array([each.race.gas for each in races.candidates])
     ran = np.isfinite(energy)
-    raced, log_energy = races.coordinates(races.points)[ran], np.log(np.maximum(energy[ran], _MIN_GAS_J))
+    raced, log_energy = races.coordinates(races.candidates)[ran], np.log(np.maximum(energy[ran], _MIN_GAS_J))
     gas = RBFInterpolator(raced, log_energy, kernel="linear", smoothing=_GAS_SMOOTHING)(coordinates)
     return np.where(hoped >= logit(races.threshold), _ABOVE_LOGITS - gas, hoped)

@@ -14,7 +14,7 @@ import numpy as np
 from ringbalance.controller.judging.judge import MOST_DRAWS
 from ringbalance.controller.trials import Trials
 from ringbalance.design.axes import Point
-from ringbalance.design.racing import DEVICES, GridPoint, Race, near, race
+from ringbalance.design.racing import DEVICES, STEP, GridPoint, Race, race
 from ringbalance.design.space import Space
 from ringbalance.design.static import Record, row_reach, static_rows
 from ringbalance.design.surface import Surface
@@ -35,41 +35,23 @@ _SWITCH_PROBABILITY: Final = 0.1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RacedDesign:
-    """Design with the result of its race."""
+class WorkablePoint:
+    """Point of the space that can work according to its values without a run."""
 
     shares: FloatArray
     """Coordinates in the unit cube."""
     reach: float
-    """Ratio of the unbalance that the design cancels in any direction to the needed one."""
+    """Ratio of the unbalance that it cancels in any direction to the needed one."""
     point: Point
     size: float
     """Volume of the cylinder around the chambers, m^3."""
-    race: Race
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Points:
-    """Points of the space that can work."""
+class RacedDesign(WorkablePoint):
+    """Design with the result of its race."""
 
-    shares: FloatArray
-    """Coordinates in the unit cube, shape (n, axes)."""
-    points: list[Point]
-    reach: FloatArray
-    """Ratios of the unbalance that each cancels in any direction to the needed one, shape (n,)."""
-
-    def some(self, numbers: Sequence[int]) -> Points:
-        """Points with these numbers."""
-        chosen = np.asarray(numbers, dtype=np.intp)
-        points = [self.points[i] for i in chosen.tolist()]
-        return Points(shares=self.shares[chosen], points=points, reach=self.reach[chosen])
-
-    def joined(self, more: Points) -> Points:
-        """Union of these and other points."""
-        shares = np.concatenate([self.shares, more.shares])
-        return Points(
-            shares=shares, points=[*self.points, *more.points], reach=np.append(self.reach, more.reach)
-        )
+    race: Race
 
 
 def threshold(required_fraction: float) -> float:
@@ -118,25 +100,28 @@ class Races:
         calls = [partial(static_rows, self.space.scene, each, intervals=False) for each in batches]
         return [row for part in deal(self.executor, calls) for row in part or ()]
 
-    def able(self, shares: FloatArray, rows: Sequence[Record] | None = None) -> Points:
+    def able(self, shares: FloatArray, rows: Sequence[Record] | None = None) -> list[WorkablePoint]:
         """Points that can work. Args: `shares`: coordinates in the unit cube. `rows`: rows without a run."""
         points = self.space.points(shares)
         rows = self.answered(points) if rows is None else rows
-        reach = [(row_reach(row) or 0.0) * (row["status"] == "ok") / self.needed for row in rows]
-        chosen = [i for i, each in enumerate(reach) if each >= self.least]
-        return Points(
-            shares=shares[chosen], points=[points[i] for i in chosen], reach=np.array(reach)[chosen]
-        )
+        reaches = [(row_reach(row) or 0.0) * (row["status"] == "ok") / self.needed for row in rows]
+        return [
+            WorkablePoint(shares=at, reach=reach, point=point, size=self.space.size(point))
+            for at, reach, point in zip(shares, reaches, points, strict=True)
+            if reach >= self.least
+        ]
 
-    def race(self, points: Points, grid_points: Sequence[Sequence[GridPoint] | None]) -> None:
+    def race(
+        self, points: Sequence[WorkablePoint], grid_points: Sequence[Sequence[GridPoint] | None]
+    ) -> None:
         """Race points that have not raced yet, and add those with a result to the candidates."""
-        keys = [repr(sorted(point.items())) for point in points.points]
+        keys = [repr(sorted(each.point.items())) for each in points]
         fresh = [i for i, key in enumerate(keys) if key not in self.raced and key not in keys[:i]]
         calls = [
             partial(
                 race,
                 self.space.hasty,
-                points.points[i],
+                points[i].point,
                 grid_points=grid_points[i],
                 required_fraction=self.threshold,
                 settings=not self.space.sets_controller,
@@ -147,41 +132,25 @@ class Races:
         self.raced |= set(keys)
         for i, raced in zip(fresh, deal(self.executor, calls), strict=True):
             if raced is not None:
-                self.add(points, i, raced)
+                self.add(points[i], raced)
 
-    def add(self, points: Points, number: int, race: Race) -> RacedDesign:
-        """Add a point, by number, with its race to the candidates."""
+    def add(self, point: WorkablePoint, race: Race) -> RacedDesign:
+        """Add a point with its race to the candidates."""
         self.fitted = None
-        self.candidates.append(
-            RacedDesign(
-                shares=points.shares[number],
-                reach=float(points.reach[number]),
-                point=points.points[number],
-                size=self.space.size(points.points[number]),
-                race=race,
-            )
-        )
+        self.candidates.append(RacedDesign(**{**vars(point), "race": race}))
         return self.candidates[-1]
 
-    @property
-    def points(self) -> Points:
-        """Points that raced."""
-        return Points(
-            shares=np.array([each.shares for each in self.candidates]),
-            points=[each.point for each in self.candidates],
-            reach=np.array([each.reach for each in self.candidates]),
-        )
-
-    def coordinates(self, points: Points) -> FloatArray:
+    def coordinates(self, points: Sequence[WorkablePoint]) -> FloatArray:
         """Coordinates of the surface: those in the unit cube, and the logarithm of the reach, since the
         fraction depends more simply on the reach than on the keys behind it."""
-        return np.column_stack([self.space.coordinates(points.shares), np.log(points.reach)])
+        shares = np.array([each.shares for each in points]).reshape(len(points), len(self.space.axes))
+        return np.column_stack([self.space.coordinates(shares), np.log([each.reach for each in points])])
 
     def surface(self) -> Surface:
         """Surface fitted to the counts of all candidates."""
         if self.fitted is None:
             self.fitted = Surface.of(
-                self.coordinates(self.points),
+                self.coordinates(self.candidates),
                 met=np.array([each.race.judgement.fraction.count for each in self.candidates]),
                 devices=np.array([each.race.judgement.meets.size for each in self.candidates]),
             )
@@ -194,41 +163,44 @@ class Races:
             each for each in self.candidates if each.race.judgement.meets.size >= DEVICES
         ] or self.candidates
 
-    def nearest_grid_points(self, shares: FloatArray) -> list[GridPoint | None]:
+    def nearest_grid_points(self, points: Sequence[WorkablePoint]) -> list[GridPoint | None]:
         """Settings of the nearest design that ran many devices, for each point."""
         measured = self._well_known
-        coordinates = self.space.coordinates(np.array([each.shares for each in measured]))
-        distance = np.linalg.norm(self.space.coordinates(shares)[:, np.newaxis] - coordinates, axis=2)
+        fresh, known = (
+            self.space.coordinates(np.array([each.shares for each in some])) for some in (points, measured)
+        )
+        distance = np.linalg.norm(fresh[:, np.newaxis] - known, axis=2)
         return [measured[i].race.grid_point for i in np.argmin(distance, axis=1).tolist()]
 
-    def grid_points(self, shares: FloatArray) -> list[list[GridPoint] | None]:
+    def grid_points(self, points: Sequence[WorkablePoint]) -> list[list[GridPoint] | None]:
         """Settings to race for each point: those of the nearest design and a few neighbours."""
         fields: list[list[GridPoint] | None] = []
-        for grid_point in self.nearest_grid_points(shares):
+        for grid_point in self.nearest_grid_points(points):
             if grid_point is None:
                 fields.append(None)
                 continue
-            neighbours = near(self.trials, grid_point)
+            kind, indices = grid_point
+            neighbours = self.trials[kind].neighbours(indices, STEP)
             chosen = self.random.permutation(len(neighbours))[:_NEIGHBOURS_PER_POINT].tolist()
-            fields.append([grid_point, *(neighbours[i] for i in chosen)])
+            fields.append([grid_point, *((kind, neighbours[i]) for i in chosen)])
         return fields
 
-    def parents(self, value: Callable[[Points], FloatArray], size: float) -> FloatArray:
+    def parents(self, value: Callable[[Sequence[WorkablePoint]], FloatArray], size: float) -> FloatArray:
         """Coordinates in the unit cube of the best designs, rescaled to a size, m^3, if size varies."""
         measured = self._well_known
         shares = np.array([each.shares for each in measured])
         if self.space.sized:
             shares = np.array([self.space.sized_at(each, size) for each in shares])
         able = self.able(shares)
-        if not able.points:
-            return shares[
-                np.argsort([-each.race.judgement.fraction.value for each in measured], kind="stable")[
-                    :_MAX_PARENTS
-                ]
-            ]
-        return able.shares[np.argsort(-value(able), kind="stable")[:_MAX_PARENTS]]
+        if able:
+            shares, values = np.array([each.shares for each in able]), value(able)
+        else:
+            values = np.array([each.race.judgement.fraction.value for each in measured])
+        return shares[np.argsort(-values, kind="stable")[:_MAX_PARENTS]]
 
-    def cloud(self, parents: FloatArray, step: float, sizes: FloatArray, *, anywhere: float = 0.0) -> Points:
+    def cloud(
+        self, parents: FloatArray, step: float, sizes: FloatArray, *, anywhere: float = 0.0
+    ) -> list[WorkablePoint]:
         """Draw points about parents, one for each size, and keep those that can work.
 
         Args: `step`: standard deviation in the unit cube. `anywhere`: fraction of points drawn about a random

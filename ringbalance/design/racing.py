@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -24,7 +24,7 @@ from ringbalance.controller.judging.judge import (
     judged_all,
 )
 from ringbalance.controller.judging.search import searched
-from ringbalance.controller.trials import Trials
+from ringbalance.controller.trials import Indices
 from ringbalance.design.axes import Point
 from ringbalance.design.static import BREAKDOWNS
 from ringbalance.results.requirements import MET, OPEN
@@ -32,8 +32,8 @@ from ringbalance.scene.arrays import BoolArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile
 
-GridPoint = tuple[int, tuple[float, ...]]
-"""Point of the search spaces: index of the space, and the fractional level index on each of its axes."""
+GridPoint = tuple[int, Indices]
+"""Point of the search spaces: index of the space, and the levels on its axes."""
 HEATS: Final = (4, 8, 24, 64)
 """Numbers of devices after each heat of a race."""
 DEVICES: Final = HEATS[-1]
@@ -101,16 +101,12 @@ def race(
         spaces = balancer.trials()
         field: list[tuple[GridPoint | None, Settings]] = [(None, {})]
         if settings and spaces:
-            coarse = [
-                (kind, indices)
-                for kind, space in enumerate(spaces)
-                for indices in product(*(axis.first for axis in space.axes))
+            coarse = [(kind, indices) for kind, space in enumerate(spaces) for indices in space.first]
+            field = [
+                ((kind, indices), each)
+                for kind, indices in (coarse if grid_points is None else grid_points)
+                if (each := spaces[kind].at(indices)) is not None
             ]
-            candidates = [
-                (grid_point, settings_at(spaces, grid_point))
-                for grid_point in (coarse if grid_points is None else grid_points)
-            ]
-            field = [(grid_point, each) for grid_point, each in candidates if each is not None]
         if not field:
             return None
         start = block * DEVICES
@@ -140,27 +136,6 @@ def race(
         return None
 
 
-def settings_at(spaces: Sequence[Trials], grid_point: GridPoint) -> Settings | None:
-    """Settings at a point of the search spaces, interpolated between levels; None: no settings there."""
-    kind, indices = grid_point
-    point = {
-        axis.name: float(np.interp(index, range(len(axis.levels)), axis.levels))
-        for axis, index in zip(spaces[kind].axes, indices, strict=True)
-    }
-    return spaces[kind].settings(point)
-
-
-def near(spaces: Sequence[Trials], grid_point: GridPoint) -> list[GridPoint]:
-    """Points at a distance of one `STEP` along one axis."""
-    kind, indices = grid_point
-    return [
-        (kind, (*indices[:axis], neighbour, *indices[axis + 1 :]))
-        for axis, index in enumerate(indices)
-        for neighbour in (index - STEP, index + STEP)
-        if 0 <= neighbour <= len(spaces[kind].axes[axis].levels) - 1
-    ]
-
-
 def judged_design(
     scene: SceneFile,
     point: Point,
@@ -183,7 +158,7 @@ def judged_design(
     try:
         balancer = quick_balancer(scene.with_values(point))
         proposed = [
-            None if grid_point is None else settings_at(balancer.trials(), grid_point),
+            None if grid_point is None else balancer.trials()[grid_point[0]].at(grid_point[1]),
             settings,
             searched(balancer) if search else None,
         ]

@@ -253,14 +253,8 @@ def _placed(scene: Scene, key: str, fault: Fault) -> Fault:
     """Attribute an error of an axis to its key of the scene; errors within a file of valves are unchanged."""
     if fault.file != COMMAND_LINE:
         return fault
-    return Fault(
-        file=scene.file,
-        table="design",
-        key=key,
-        value=toml_text(scene.design.valve_file) if key == "valve_file" else fault.value,
-        problem=fault.problem,
-        allowed=fault.allowed,
-    )
+    value = toml_text(scene.design.valve_file) if key == "valve_file" else fault.value
+    return replace(fault, file=scene.file, table="design", key=key, value=value)
 
 
 def _ranges(scene: Scene) -> dict[str, tuple[float, float, bool]]:

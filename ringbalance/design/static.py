@@ -6,7 +6,6 @@ effects are added as root of the sum of squares.  It excludes the models' uncert
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
@@ -22,7 +21,7 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import TubeFlow
 from ringbalance.results.numbers import believed
 from ringbalance.results.rows import Finding
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, finite
 from ringbalance.scene.changes import document_of, nameless
 from ringbalance.scene.designs import Designs, changes_of, in_batches
 from ringbalance.scene.errors import larger, uncertainties
@@ -55,7 +54,6 @@ _ANSWER_FIELDS: Final = {"lambda": "moment_per_mass"}
 """Field of `Answers` by name of the result, where they differ."""
 BLOCKED: Final = "blocked"
 REFUSED: Final = "point_refused"
-"""Code of the finding on a refused point."""
 EMPTY: Final[Mapping[str, Any]] = MappingProxyType(
     {
         **dict.fromkeys(("devices", "fraction", "low", "high", "settling_time", "settling_time_high")),
@@ -122,26 +120,16 @@ def _answered(scenes: Sequence[Scene], intervals: bool) -> list[Record]:
         if len(scenes) == 1:
             return [_failed(error)]
         return [row for each in scenes for row in _answered([each], intervals)]
-    return [_row(column) for column in table.T]
-
-
-def _row(column: FloatArray) -> Record:
-    values, widths = column[1 : 1 + len(UNITS)].tolist(), column[1 + len(UNITS) :].tolist()
-    pairs = {
-        name: [_plain(value), _plain(believed(value, width, stated=True) or 0.0)]
-        for name, value, width in zip(UNITS, values, widths, strict=True)
-    }
-    blocked = int(column[0]) == Regime.BLOCKED
-    return {
-        "values": pairs,
-        "units": dict(UNITS),
-        "status": BLOCKED if blocked else "ok",
-        "finding": None,
-    }
-
-
-def _plain(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    rows = []
+    for regime, *column in table.T.tolist():
+        triples = zip(UNITS, column[: len(UNITS)], column[len(UNITS) :], strict=True)
+        values = {
+            name: [finite(value), finite(believed(value, width, stated=True) or 0.0)]
+            for name, value, width in triples
+        }
+        status = BLOCKED if int(regime) == Regime.BLOCKED else "ok"
+        rows.append({"values": values, "units": dict(UNITS), "status": status, "finding": None})
+    return rows
 
 
 def core_table(designs: Designs, *, intervals: bool) -> FloatArray:
@@ -174,7 +162,7 @@ def _row_without_core(scene: SceneFile) -> Record:
         width = None
         if each.lower is not None and each.upper is not None and each.value:
             width = max(abs(each.lower - each.value), abs(each.upper - each.value))
-        values[name], units[name] = [_plain(each.value), width], each.unit
+        values[name], units[name] = [finite(each.value), width], each.unit
     return {"sha256": scene.sha256, "values": values, "units": units, "status": "ok", "finding": None}
 
 

@@ -71,6 +71,11 @@ class Quantity:
         low, high = fraction.low, fraction.high
         return cls(key=key, name=name, value=fraction.value, lower=low, upper=high, origin="simulated")
 
+    @classmethod
+    def simulated(cls, key: str, name: str, value: float | None, unit: str, status: str = "ok") -> Quantity:
+        """Result of runs, with three digits."""
+        return cls(key=key, name=name, value=value, unit=unit, origin="simulated", status=status, digits=3)
+
     @property
     def width(self) -> Width:
         """Distances of both ends from the value; None without an interval."""

@@ -52,14 +52,15 @@ def arguments(function: Function) -> dict[str, str]:
 
 
 def contract(function: Function) -> Contract:
-    """What must agree for a method to inherit a protocol's text."""
+    """What must agree for a method to inherit the text of a protocol or an abstract class."""
     return function.name, tuple(arguments(function))
 
 
 def protocol_methods(tree: ast.Module) -> Iterator[Contract]:
-    """Documented methods of the protocols of a module."""
+    """Documented methods of the protocols and abstract classes of a module."""
     for node in tree.body:
-        if isinstance(node, ast.ClassDef) and any("Protocol" in ast.unparse(base) for base in node.bases):
+        bases = [ast.unparse(base) for base in node.bases] if isinstance(node, ast.ClassDef) else []
+        if isinstance(node, ast.ClassDef) and any("Protocol" in base or base == "ABC" for base in bases):
             for inner in node.body:
                 if isinstance(inner, Function) and ast.get_docstring(inner):
                     yield contract(inner)

@@ -28,7 +28,7 @@ from ringbalance.controller.judging.search import searched
 from ringbalance.design import closing
 from ringbalance.design.closing import _sharpened, enlarged, growth
 from ringbalance.design.races import RacedDesign, Races, deal, threshold
-from ringbalance.design.racing import Race, near, settings_at
+from ringbalance.design.racing import STEP, Race
 from ringbalance.design.space import Space
 from ringbalance.design.static import row_reach, static_rows
 from ringbalance.results.requirements import MET, MISSED, OPEN, Proportion
@@ -291,13 +291,13 @@ def test_settings_lie_between_levels_too() -> None:
     below, between, above = (
         settings["controller.gas_time_offset"][0]
         for level in (4.0, 4.5, 5.0)
-        if (settings := settings_at(trials, (kind, (level,)))) is not None
+        if (settings := trials[kind].at((level,))) is not None
     )
     assert between == pytest.approx((below + above) / 2, abs=1e-4)
     assert below < between < above
     last = len(trials[kind].axes[0].levels) - 1
-    assert near(trials, (kind, (4.5,))) == [(kind, (4.0,)), (kind, (5.0,))]
-    assert near(trials, (kind, (float(last),))) == [(kind, (last - 0.5,))]
+    assert trials[kind].neighbours((4.5,), STEP) == [(4.0,), (5.0,)]
+    assert trials[kind].neighbours((float(last),), STEP) == [(last - 0.5,)]
 
 
 def test_the_tube_follows_the_disc() -> None:
@@ -360,10 +360,9 @@ class Line:
         return SimpleNamespace(fraction=ran, verdict=verdict, settings={}, meets=np.ones(64, dtype=bool))
 
     def design(self, share: float, judgement: Any = None) -> RacedDesign:
-        points = self.races.able(np.array([[share, 0.5, 0.5]]))
+        (point,) = self.races.able(np.array([[share, 0.5, 0.5]]))
         race = Race(grid_point=None, judgement=judgement)
-        size = self.races.space.size(points.points[0])
-        return RacedDesign(shares=points.shares[0], reach=1.0, point=points.points[0], size=size, race=race)
+        return RacedDesign(**{**vars(point), "reach": 1.0, "race": race})
 
     def judged(self, share: float) -> RacedDesign:
         return self.design(share, self.judgement(self.design(share).size))

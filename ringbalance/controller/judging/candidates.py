@@ -9,7 +9,7 @@ from typing import Final
 
 from ringbalance.controller.balancer import Outcomes, Settings
 from ringbalance.controller.judging.judge import Judgement
-from ringbalance.controller.trials import Trials
+from ringbalance.controller.trials import Indices, Trials
 from ringbalance.results.requirements import MET, MISSED, OPEN, Paired
 from ringbalance.scene.arrays import BoolArray
 
@@ -33,36 +33,23 @@ class SearchPoint:
     """Candidate settings of a balancer: a level on each axis of its trials."""
 
     trials: Trials
-    places: tuple[int, ...]
-    """Indices of its levels on the axes."""
+    places: Indices
     level: float | None
     """Level on the scan axis; None: the scene's."""
 
     @cached_property
     def settings(self) -> Settings | None:
         """Settings by path; None: there are none at this point."""
-        levels = {axis.name: axis.levels[at] for axis, at in zip(self.trials.axes, self.places, strict=True)}
-        if self.level is not None and self.trials.scan_axis is not None:
-            levels[self.trials.scan_axis.name] = self.level
-        return self.trials.settings(levels)
+        return self.trials.at(self.places, self.level)
 
     @property
-    def key(self) -> tuple[str, tuple[int, ...], float | None]:
+    def key(self) -> tuple[str, Indices, float | None]:
         """Hashable name of this point."""
         return self.trials.kind, self.places, self.level
 
     def neighbours(self) -> list[SearchPoint]:
         """Candidates one level away on one axis."""
-        return [
-            replace(self, places=(*self.places[:axis], at + by, *self.places[axis + 1 :]))
-            for axis, at in enumerate(self.places)
-            for by in (-1, 1)
-            if 0 <= at + by < len(self.trials.axes[axis].levels)
-        ]
-
-    def at(self, level: float) -> SearchPoint:
-        """This point at another level of the scan axis."""
-        return replace(self, level=level)
+        return [replace(self, places=each) for each in self.trials.neighbours(self.places)]
 
     def is_beside(self, other: SearchPoint) -> bool:
         """True if both are at most one level apart on every axis."""

@@ -26,8 +26,7 @@ from ringbalance.scene.faults import SceneError
 _HOUR_S: Final = 3600.0
 _WATCH_TIMES_S: Final = (300.0, 300.0 + _HOUR_S)
 """Times after settling between which the gas of a device is that of holding."""
-_DEVICES: Final = (2 * BLOCK, 4 * BLOCK)
-"""Numbers of devices, least and largest."""
+_LEAST_DEVICES, _MOST_DEVICES = 2 * BLOCK, 4 * BLOCK
 _LOSSES: Final = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 """Parts of the liquid lost that are tried, up to the first without which the requirement is missed."""
 _HALF_STEP: Final = 0.05
@@ -132,7 +131,8 @@ def endurance(
     if judgement.verdict == MISSED or not np.isfinite(judgement.outcomes.lost).any():
         return None
     settings, required = [judgement.settings], judgement.required_fraction
-    draws = Draws.block(FIRST_VERDICT_DEVICE, int(np.clip(judgement.meets.size, *_DEVICES)))
+    count = min(max(judgement.meets.size, _LEAST_DEVICES), _MOST_DEVICES)
+    draws = Draws.block(FIRST_VERDICT_DEVICE, count)
     before, after = (balancer.run_all(settings, draws, watch_time=each)[0] for each in _WATCH_TIMES_S)
     settled = before.settled & after.settled
     rates = np.where(settled, after.lost - before.lost, 0.0)

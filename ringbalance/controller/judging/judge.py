@@ -33,7 +33,6 @@ class Judgement:
     settings: Settings
     """Values that differ from the scene's, by path, SI."""
     required_fraction: float
-    """Fraction of the devices that must meet every demand."""
     demands: tuple[Demand, ...]
     outcomes: Outcomes
     reported: tuple[Demand, ...] = ()

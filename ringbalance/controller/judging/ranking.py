@@ -46,7 +46,6 @@ class Deciding:
     outcome: str
     """`MEETS`, or the rank of the device by "settling_time" or "final_amplitude"."""
     index: float
-    """First-order index."""
     noise: float
     """Standard deviation of the index of an input without effect."""
     common: bool

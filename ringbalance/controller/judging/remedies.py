@@ -6,10 +6,10 @@ Inputs are drawn by name and number, so a device is the same under every remedy.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import combinations, product
+from itertools import combinations
 from typing import Any, Final
 
 import numpy as np
@@ -22,6 +22,7 @@ from ringbalance.controller.judging.judge import (
     judged_all,
     plain_settings,
 )
+from ringbalance.controller.trials import Indices
 from ringbalance.results.requirements import MET, MISSED
 from ringbalance.results.rows import series
 from ringbalance.scene.changes import rechecked
@@ -30,7 +31,6 @@ from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import value_at
 
 Search = Callable[[Balancer], Settings]
-"""Finds the best settings of a balancer."""
 Progress = Callable[[str], None]
 _FIRST_DEVICES: Final = 16
 """Devices after which a remedy that serves far too few is given up."""
@@ -42,7 +42,6 @@ _COARSE_DEVICES: Final = (4, 4, 8)
 _NEAR_DEVICES: Final = (8, 40)
 """Further devices in each round of the levels beside its best."""
 _HALFWAY_DIGITS: Final = 2
-"""Significant digits of a value between two alternatives."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -201,33 +200,24 @@ def coarse_settings(balancer: Balancer) -> Settings:
     """
     space = balancer.trials()[0]
 
-    def at(point: tuple[int, ...]) -> Settings | None:
-        levels = {axis.name: axis.levels[i] for axis, i in zip(space.axes, point, strict=True)}
-        return space.settings(levels)
-
-    def race(points: Iterable[tuple[int, ...]], rounds: Sequence[int], start: int) -> tuple[int, ...] | None:
-        left = [point for point in points if at(point) is not None]
+    def race(points: Sequence[Indices], rounds: Sequence[int], start: int) -> Indices | None:
+        left = [point for point in points if space.at(point) is not None]
         counts = np.zeros(len(left), dtype=np.int64)
         for count in rounds if left else ():
-            outcomes = balancer.run_all([at(point) or {} for point in left], Draws.block(start, count))
+            outcomes = balancer.run_all([space.at(point) or {} for point in left], Draws.block(start, count))
             counts += [int(np.count_nonzero(each.settled)) for each in outcomes]
             leading = np.flatnonzero(counts >= -np.sort(-counts)[(len(left) - 1) // 3])
             left, counts, start = [left[i] for i in leading], counts[leading], start + count
         return left[int(np.argmax(counts))] if left else None
 
-    best = race(product(*(axis.first for axis in space.axes)), _COARSE_DEVICES, 0)
+    best = race(space.first, _COARSE_DEVICES, 0)
     if best is None:
         return {}
-    near = [
-        range(max(i - 1, 0), min(i + 2, len(axis.levels))) for axis, i in zip(space.axes, best, strict=True)
-    ]
-    neighbours = [
-        point for point in product(*near) if sum(i != j for i, j in zip(point, best, strict=True)) <= 2
-    ]
-    best = (
-        race(sorted(neighbours, key=lambda point: point != best), _NEAR_DEVICES, sum(_COARSE_DEVICES)) or best
-    )
-    return at(best) or {}
+    # In the order of the grid after the best itself, which wins among equals.
+    beside = {near for each in space.neighbours(best) for near in (each, *space.neighbours(each))}
+    near = sorted(each for each in beside if all(abs(i - j) <= 1 for i, j in zip(each, best, strict=True)))
+    best = race([best, *(each for each in near if each != best)], _NEAR_DEVICES, sum(_COARSE_DEVICES)) or best
+    return space.at(best) or {}
 
 
 def _judge(

@@ -9,9 +9,9 @@ last few settings; other devices judge the choice.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -41,8 +41,7 @@ _CLEAR_FINALISTS: Final = 3
 its edge."""
 _GOOD_FRACTION: Final = 0.9
 """Fraction of the devices that the best settings must serve to end the wider search."""
-_ROUNDS: Final = 6
-"""Rounds in which neighbours are tried."""
+_WIDE_ROUNDS: Final = 6
 _ALONG: Final = 3
 """Rounds at a level of the scan axis, from the best of a neighbouring level."""
 _SCAN_DRAWS: Final = tuple(
@@ -72,7 +71,7 @@ def search(
     winners: list[Tried] = []
     for space in trials:
         evaluated = dict((ran or {}).get(space.kind, {}))
-        _climb(balancer, evaluated, _coarse(space, level), rounds=_ROUNDS, wide=True, progress=progress)
+        _climb(balancer, evaluated, _coarse(space, level), rounds=_WIDE_ROUNDS, wide=True, progress=progress)
         served = [each for each in evaluated.values() if each]
         best = chosen(served)
         if best is not None and best.count:
@@ -101,10 +100,7 @@ def _ordered(best: Iterable[Tried], trials: Sequence[Trials]) -> tuple[Tried, ..
 
 
 def _coarse(trials: Trials, level: float | None) -> list[SearchPoint]:
-    return [
-        SearchPoint(trials=trials, places=places, level=level)
-        for places in product(*(axis.first for axis in trials.axes))
-    ]
+    return [SearchPoint(trials=trials, places=each, level=level) for each in trials.first]
 
 
 def _climb(
@@ -173,7 +169,6 @@ class ScanLevel:
     """The best settings at one level of an axis, over devices that they were not chosen on."""
 
     level: float
-    """SI."""
     judgement: Judgement
 
     @property
@@ -293,7 +288,11 @@ class _Levels:
             return
         ran, serving = self.ran.setdefault(at, {}).setdefault(kind, {}), self.serving.setdefault(at, {})
         before = serving.get(kind)
-        start = _coarse(trials, level) if near is None else [self._serving(near)[kind].candidate.at(level)]
+        start = (
+            _coarse(trials, level)
+            if near is None
+            else [replace(self._serving(near)[kind].candidate, level=level)]
+        )
         climb = partial(_climb, self.balancer, ran, wide=False, progress=lambda _: None)
         climb(start, rounds=1, other=chosen(serving.values()))
         best = chosen(each for each in ran.values() if each)
@@ -314,11 +313,8 @@ class _Levels:
         """
         required, scenes_kind = self.balancer.required_fraction(), self.trials[0].kind
         evaluated = self._evaluated
-        fractions = {
-            each: best[scenes_kind].fraction
-            for each in evaluated
-            if scenes_kind in (best := self._serving(each))
-        }
+        serving = ((each, self._serving(each)) for each in evaluated)
+        fractions = {each: best[scenes_kind].fraction for each, best in serving if scenes_kind in best}
         if near is None or fractions.get(at, 0.0) >= required:
             return fractions.get(at, 0.0) >= required
         best_there = self._compared(near)
@@ -332,9 +328,8 @@ class _Levels:
         for at in self._evaluated:
             level = self.axis.levels[at]
             best = _ordered(self._compared(at).values(), self.trials)
-            chosen_settings = (best[0].candidate.at(level).settings if best else None) or {
-                self.axis.name: level
-            }
+            at_level = replace(best[0].candidate, level=level).settings if best else None
+            chosen_settings = at_level or {self.axis.name: level}
             if at not in before or before[at].judgement.settings != chosen_settings:
                 settings[at] = chosen_settings
         judgements: dict[int, Judgement] = {}
@@ -344,12 +339,8 @@ class _Levels:
                 break
             ran = self.balancer.run_all([settings[at] for at in pending], draws)
             for at, outcomes in zip(pending, ran, strict=True):
-                earlier = judgements.get(at)
-                judgements[at] = (
-                    earlier.extended(outcomes)
-                    if earlier
-                    else Judgement.of(self.balancer, settings[at], outcomes)
-                )
+                new = Judgement.of(self.balancer, settings[at], outcomes)
+                judgements[at] = judgements[at].extended(outcomes) if at in judgements else new
             # The first devices are enough where none of them is served.
             pending = [at for at in pending if judgements[at].fraction.count]
         return {at: ScanLevel(level=self.axis.levels[at], judgement=each) for at, each in judgements.items()}

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.balance_grades import grade_quantities
 from ringbalance.controller.balancer import ROTOR_AMPLITUDE, WATCH_TIME_S, Demand, Settings
 from ringbalance.controller.judging.holding import Endurance
 from ringbalance.controller.judging.judge import Judgement, plain_settings
@@ -16,7 +17,6 @@ from ringbalance.controller.judging.ranking import Ranking
 from ringbalance.controller.judging.remedies import Remedied
 from ringbalance.controller.judging.search import ScanLevel
 from ringbalance.controller.rotor import CommonRotor, assumed_rotor
-from ringbalance.controller.standards import grade_rows
 from ringbalance.controller.trials import Information
 from ringbalance.results.numbers import format_given, percent
 from ringbalance.results.requirements import MET, MISSED, OPEN
@@ -115,8 +115,8 @@ class Tuning(Result):
         return "; ".join(finding.text for finding in islice(self._findings(), 2))
 
     def to_dict(self) -> dict[str, Any]:
-        """The result as a JSON document, SI."""
         scene, best = self.given, self.recommended
+        ideal_part = {**best.document(), "settings": plain_settings(best.settings)}
         return {
             "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
             "balancer": scene.balancer,
@@ -124,9 +124,7 @@ class Tuning(Result):
             "asked": best.required_fraction,
             **self.judgement.document(),
             "settings": plain_settings(self.changes),
-            "ideal_part": {**best.document(), "settings": plain_settings(best.settings)}
-            if self.open_choice
-            else None,
+            "ideal_part": ideal_part if self.open_choice else None,
             "own": self.own and self.own.document(),
             "further_s": WATCH_TIME_S,
             "longer": self.longer
@@ -165,7 +163,6 @@ class Tuning(Result):
         }
 
     def rows(self) -> Rows:
-        """The result as quantities, findings and tables."""
         scene = self.given
         settings = []
         for path, value in self.changes.items():
@@ -209,14 +206,10 @@ class Tuning(Result):
         )
 
     def _quantities(self) -> Iterator[Quantity]:
-        ideal = "with an ideal valve, " if self.choices else ""
+        ideal, with_ideal = ("with an ideal valve, ", self.recommended) if self.choices else ("", None)
         for key, name, judgement in (
             ("fraction_met", "devices that meet what is required", self.judgement),
-            (
-                "fraction_met_ideal",
-                "the same with an ideal valve",
-                self.recommended if self.choices else None,
-            ),
+            ("fraction_met_ideal", "the same with an ideal valve", with_ideal),
             ("fraction_met_own", f"the same {ideal}with the scene's own settings", self.own),
             ("fraction_met_longer", f"the same, {ideal}watched longer", self.longer),
         ):
@@ -225,33 +218,22 @@ class Tuning(Result):
         yield from reported_quantities(self.judgement)
         times = self.judgement.settling_times
         for part, name in (("p50", "half of them settle within"), ("p90", "nine tenths settle within")):
-            yield Quantity(
-                key=f"settling_time_{part}",
-                name=name,
-                unit="s",
-                value=times[part],
-                origin="simulated",
-                status="ok" if times[part] is not None else "not_reached",
-                digits=3,
-            )
+            status = "ok" if times[part] is not None else "not_reached"
+            yield Quantity.simulated(f"settling_time_{part}", name, times[part], "s", status)
         yield from self.standards
 
     @property
-    def standards(self) -> tuple[Quantity, ...]:
+    def standards(self) -> Iterator[Quantity]:
         """Residual unbalance that the judged settings achieve, its grade, and what API 617 allows."""
         rotor, judgement = self.rotor, self.judgement
         if rotor is None or (amplitude := judgement.amplitude_reached) is None:
-            return ()
+            return
         residual, limit = (each / abs(rotor.influence) for each in (amplitude, rotor.limit))
         reached_by = f"by {percent(judgement.required_fraction)} of the devices"
         name = f"minimum achievable residual unbalance (ISO 21940-21), with these settings, {reached_by}"
-        grades = grade_rows(
+        yield Quantity.simulated("minimum_achievable_unbalance", name, residual, "kg m")
+        yield from grade_quantities(
             mass=rotor.mass, speed=rotor.speed, residual=residual, limit=limit, reached_by=reached_by
-        )
-        rows = [("minimum_achievable_unbalance", name, residual, "kg m", "ok"), *grades]
-        return tuple(
-            Quantity(key=key, name=name, value=value, unit=unit, origin="simulated", status=status, digits=3)
-            for key, name, value, unit, status in rows
         )
 
     def _findings(self) -> Iterator[Finding]:
@@ -280,9 +262,8 @@ class Tuning(Result):
         elif not best.settings:
             yield Finding(code="tuned_own_best")
         else:
-            yield Finding(
-                code="tuned_own", values={**unchanged.sentence_values, "verdict": unchanged.verdict}
-            )
+            values = {**unchanged.sentence_values, "verdict": unchanged.verdict}
+            yield Finding(code="tuned_own", values=values)
         if self.longer is not None:
             values = {**self.longer.sentence_values, "time": LONG_WATCH_TIME_S, "first": WATCH_TIME_S}
             yield Finding(code="tuned_longer", values=values)

@@ -41,7 +41,7 @@ from ringbalance.controller.liquid_ring.devices import Spread, rotor_like
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
 from ringbalance.controller.liquid_ring.drying import part_per_gas
 from ringbalance.controller.liquid_ring.loop_factor import loop_information
-from ringbalance.controller.liquid_ring.offers import drawn_input, remedies_of, trials, valves_of
+from ringbalance.controller.liquid_ring.offers import drawn_input, remedies_of, trials, valve_choices
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import CommonRotor, Rotors, Sensor, wrapped
 from ringbalance.controller.simulation import Simulation
@@ -69,12 +69,15 @@ from ringbalance.scene.draws import BLOCK, run_noise
 from ringbalance.scene.loop_models import RequirementSettings, Runout
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.origins import SceneFile, with_values_at
+from ringbalance.scene.origins import SceneFile, raw_value_at, with_values_at
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths
 
-_GAIN: Final = 30.0
-"""Factor up to which a gain or a time is tried."""
-_PRESSURE: Final = 3.0
+_SETTING_FACTORS: Final = {
+    "gas.pressure": 3.0,
+    "controller.proportional": 30.0,
+    "controller.integral_time": 30.0,
+}
+"""Largest factors on settings that are tried, up and down."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +123,6 @@ class LiquidRingBalancer(Balancer):
 
     @property
     def models_used(self) -> tuple[ModelUsed, ...]:
-        """Every physical term, with its model and its estimated contribution."""
         return run_models(scene=self.scene, model=self.model)
 
     def inputs(self) -> tuple[Input, ...]:
@@ -131,22 +133,8 @@ class LiquidRingBalancer(Balancer):
 
     def settings(self) -> tuple[Setting, ...]:
         """Gas pressure, gain and integral time."""
-        gas, settings = self.scene.gas, self.scene.controller
-        listed = [
-            Setting(
-                path="gas.pressure",
-                value=gas.pressure,
-                lowest=gas.pressure / _PRESSURE,
-                highest=gas.pressure * _PRESSURE,
-            )
-        ]
-        for path, value in (
-            ("controller.proportional", settings.proportional),
-            ("controller.integral_time", settings.integral_time),
-        ):
-            if value is not None:
-                listed.append(Setting(path=path, value=value, lowest=value / _GAIN, highest=value * _GAIN))
-        return tuple(listed)
+        values = ((path, raw_value_at(self.scene, path), factor) for path, factor in _SETTING_FACTORS.items())
+        return tuple(Setting.about(path, value, factor=by) for path, value, by in values if value is not None)
 
     def run(
         self,
@@ -161,10 +149,8 @@ class LiquidRingBalancer(Balancer):
         if not (trace or foreign or self.to_time_limit):
             return self.run_all([settings], draws)[0]
         scene = with_values_at(self.scene, settings)
-        traced = [
-            self._traced(scene, number, devices=draws.devices, progress=progress) for number in draws.numbers
-        ]
-        return Outcomes.of(traced, trace=trace)
+        runs = (self._traced(scene, n, devices=draws.devices, progress=progress) for n in draws.numbers)
+        return Outcomes.of(tuple(runs), trace=trace)
 
     def run_all(
         self, settings: Sequence[Settings], draws: Draws, *, watch_time: float = WATCH_TIME_S
@@ -173,7 +159,6 @@ class LiquidRingBalancer(Balancer):
         return self.drawn_runs.outcomes(settings, draws, watch_time=watch_time)
 
     def required_fraction(self) -> float:
-        """Fraction of the devices that the scene requires to meet every demand."""
         return self.scene.requirement.fraction
 
     def demands(self) -> tuple[Demand, ...]:
@@ -205,19 +190,17 @@ class LiquidRingBalancer(Balancer):
         return trials(self.scene, self.model, limit=self.limit)
 
     def remedies(self) -> tuple[Remedy, ...]:
-        """Changes of the scene that may help, those of one kind with the smallest first."""
         return tuple(remedies_of(self.scene, self.model))
 
     def choices(self) -> tuple[Remedy, ...]:
         """Valves that can be bought, where the scene gives none."""
-        return valves_of(self.scene)
+        gas = self.scene.gas
+        return valve_choices(self.scene, lag=gas.valve_lag) if gas.conductance is None else ()
 
     def drawn_input(self, name: str) -> DrawnInput:
-        """Kind of a drawn input."""
         return drawn_input(name)
 
     def on_scene(self, scene: SceneFile) -> LiquidRingBalancer:
-        """Balancer of another scene, with these options."""
         return replace(self, scene=liquid_ring_scene(scene))
 
     def after_loss(self, part: float) -> LiquidRingBalancer:
@@ -288,7 +271,6 @@ class LiquidRingBalancer(Balancer):
         )
 
     def rotor(self, number: int | None = None) -> CommonRotor:
-        """Rotor of the scene, or of a drawn device."""
         scene = self.scene if number is None else self.drawn_runs.device(number).scene
         size = self.scene.sensor.runout_amplitude
         return CommonRotor(
@@ -336,11 +318,9 @@ class LiquidRingBalancer(Balancer):
         return replace(self, scene=scene, rotors=rotors)
 
     def sampling_time(self) -> float:
-        """Period of the controller, s."""
         return self.scene.controller.period
 
     def lasting(self, span: float) -> LiquidRingBalancer:
-        """Balancer with runs of a duration, s, that continue when they have settled."""
         run = replace(self.scene.run, time_limit=span)
         return replace(self, scene=replace(self.scene, run=run), to_time_limit=True)
 
@@ -357,7 +337,6 @@ class LiquidRingBalancer(Balancer):
         return tuple(beyond_capacity(liquid_ring_scene(scene), self.model, ended, settings=settings))
 
     def quantities(self) -> tuple[Quantity, ...]:
-        """Quantities of the scene's calibration."""
         return calibrate(self.scene).rows().quantities
 
     def rows(self, run: Simulation) -> Rows:
@@ -366,7 +345,6 @@ class LiquidRingBalancer(Balancer):
         return replace(rows, tables=(line_runs_table(line_runs(run)), *rows.tables))
 
     def history(self, run: Simulation) -> Mapping[str, Sequence[Any]]:
-        """Histories of a run by the name of their column."""
         return simulation_history(run)
 
 

@@ -46,7 +46,6 @@ class Spread:
     """Differences between the devices of a scene under a law."""
 
     errors: tuple[Uncertainty, ...]
-    """Drawn inputs and model errors."""
     remade: bool
     """True if each device has its own law; False: the scene's with a factor on the velocity."""
 

@@ -52,7 +52,6 @@ _GROUPS: Final = (0, 4, 16, 32, 64)
 the same bits whichever others are requested, and a design that fails on four devices needs no more.
 """
 _CACHED_GROUPS: Final = 32
-"""Size of each cache: groups of devices, and groups under a gas pressure."""
 _OUT_OF_REACH: Final = 2.0
 """Ratio of the vibration that remains with chambers emptied to their residual fills to the limit, above which
 a run need not be carried out: it does not settle, and would take its whole time limit.  Beyond the fill where
@@ -219,7 +218,6 @@ class _Group:
     devices: tuple[RingDevice, ...]
     """Devices of the group; those that differ in numerical values alone are adjacent."""
     scenes: tuple[Scene, ...]
-    """Scenes of the devices, with their settings."""
     kinds: tuple[tuple[slice, Scene], ...]
     """Rows of devices that differ in numerical values alone, and these as one scene."""
     plants: Records

@@ -89,9 +89,8 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any] 
     rate, sensor = loop_rate(scene, model), scene.sensor
     # Standard deviation of the measured vibration at an amplitude equal to the limit, m.
     noise = math.hypot(sensor.amplitude_noise, scene.controller.limit * sensor.phase_noise)
-    error = 0.0
     value: float | None = None
-    integral = derivative = 0.0
+    error = integral = derivative = 0.0
     settings = scene.controller
     if isinstance(controller, TargetVector):
         value = settings.proportional * rate
@@ -100,8 +99,10 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any] 
         derivative = settings.derivative_time / settings.period
     if isinstance(controller, LawBased):
         value = scene.rotor.influence_coefficient / abs(settings.assumed_influence)
+    # The law-based algorithm approaches a loop factor of one.
+    fixed = isinstance(controller, TargetVector)
     deviation = _stationary_deviation(
-        loop_factor=1.0 if value is None or isinstance(controller, LawBased) else value,
+        loop_factor=value if fixed and value is not None else 1.0,
         noise=noise,
         integral=integral,
         derivative=derivative,
@@ -109,14 +110,12 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any] 
     )
     margins = None
     if value is not None and rate != 0.0:
-        # The law-based algorithm approaches a loop factor of one.
-        fixed = isinstance(controller, TargetVector)
         margins = loop_margins(cmath.rect(value, error) if fixed else 1.0, integral=integral > 0.0)
     return LoopFactor(
         rate=rate,
         value=value,
         margins=margins,
-        fixed=isinstance(controller, TargetVector),
+        fixed=fixed,
         limit=2.0 * max(math.cos(error), 0.0),
         deviation=None if value is None else deviation,
     )
@@ -314,8 +313,7 @@ def loop_information(scene: Scene, model: BalancerModel) -> Information:
     """Loop factor and margins of the linear loop about the balanced state, with gas line and models."""
     loop, settings = loop_factor(scene, model, controller_of(scene, model)), scene.controller
     used, lines = run_models(scene=scene, model=model), line_answers(scene, model)
-    margins = loop.margins
-    neglected = neglected_in_injections(used)
+    margins, neglected = loop.margins, neglected_in_injections(used)
     document: dict[str, Any] = {
         "law": model.name,
         "controller": settings.kind,
@@ -325,9 +323,7 @@ def loop_information(scene: Scene, model: BalancerModel) -> Information:
         "vibration_rate_m_per_s": loop.rate,
         "stationary_deviation_m": finite(loop.deviation),
         "vibration_left_m": vibration_left(scene, loop),
-        "margins": None
-        if margins is None
-        else {name: finite(value) for name, value in asdict(margins).items()},
+        "margins": margins and {name: finite(value) for name, value in asdict(margins).items()},
         "gas_time_offset_s": list(settings.offsets(scene.disc.chambers)),
         "limit_m": settings.limit,
         "gas_line": line_document(lines),
@@ -362,12 +358,7 @@ def _quantities(scene: Scene, loop: LoopFactor, margins: Margins | None) -> Iter
         rows += [
             ("gain_margin", "gain margin, factor", "1", finite(margins.gain_factor)),
             ("phase_margin", "phase margin", "rad", margins.phase),
-            (
-                "disk_gain_margin",
-                "disk margin of P alone, factor",
-                "1",
-                finite(margins.disk_gain_factor),
-            ),
+            ("disk_gain_margin", "disk margin of P alone, factor", "1", finite(margins.disk_gain_factor)),
             ("disk_phase_margin", "disk margin of P alone, phase", "rad", margins.disk_phase),
         ]
     for key, name, unit, value in rows:

@@ -36,7 +36,6 @@ class LiquidRing:
 
     model: BalancerModel
     chambers: int
-    """Number of chambers n, even."""
     dynamics: Dynamics
     total: float
     """Sum of the two fill ratios of a pair."""

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from ball_balancer.scene_keys import BallScene
 from ringbalance.controller.balancer import Remedy
 from ringbalance.controller.rotor import CommonRotor, rotor_fault
-from ringbalance.controller.standard import Measure, StandardBalancer, StandardRun
+from ringbalance.controller.standard_balancer import Measure, StandardBalancer, StandardRun
 from ringbalance.results.rows import Finding
 
 INSTANTS = 2001

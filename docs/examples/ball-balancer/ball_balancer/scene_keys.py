@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 from typing import Annotated, ClassVar
 
-from ringbalance.controller.standard import StandardScene, standard_kind
+from ringbalance.controller.standard_balancer import StandardScene, standard_kind
 from ringbalance.scene.keys.declaration import UNCERTAIN, needed, standard
 from ringbalance.scene.keys.fields import POSITIVE, Angles, PositiveLength, PositiveMass, quantity
 

@@ -126,7 +126,7 @@ class StandardRun:
     limit: float
     """Amplitude to come below, m."""
     findings: tuple[Finding, ...] = ()
-    """Findings, the end of the run first."""
+    """The end of the run first."""
 
     @property
     def amplitude(self) -> FloatArray:
@@ -210,29 +210,23 @@ class StandardBalancer(Balancer):
 
     def settings(self) -> tuple[Setting, ...]:
         """The settings of `setting_paths`."""
-        factor, values = _SETTING_FACTOR, {path: value_at(self.scene, path) for path in self.setting_paths}
-        return tuple(
-            Setting(path=path, value=value, lowest=value / factor, highest=value * factor)
-            for path, value in values.items()
-        )
+        pairs = ((path, value_at(self.scene, path)) for path in self.setting_paths)
+        return tuple(Setting.about(path, value, factor=_SETTING_FACTOR) for path, value in pairs)
 
     def trials(self) -> tuple[Trials, ...]:
         """All settings at levels between their bounds."""
-        values = {each.path: each.value for each in self.settings()}
-        if not values:
-            return ()
+        listed = self.settings()
         levels = tuple(np.geomspace(1 / _SETTING_FACTOR, _SETTING_FACTOR, _SETTING_LEVELS).tolist())
-        axes = [SearchAxis(name=path, levels=levels, first=(0, 2, 4, 6, 8)) for path in values]
+        axes = tuple(SearchAxis(name=each.path, levels=levels, first=(0, 2, 4, 6, 8)) for each in listed)
 
         def settings(point: Mapping[str, float]) -> dict[str, float]:
-            return {path: rounded(point[path] * value) for path, value in values.items()}
+            return {each.path: rounded(point[each.path] * each.value) for each in listed}
 
-        return (Trials(kind=self.scene.balancer, axes=tuple(axes), settings=settings),)
+        return (Trials(kind=self.scene.balancer, axes=axes, settings=settings),) if axes else ()
 
     def run(
         self, settings: Settings, draws: Draws, *, trace: bool = False, progress: Progress | None = None
     ) -> Outcomes:
-        """Run the devices one by one; see `Balancer`."""
         assumed, span = with_values_at(self.scene, settings), self.span()
         results, inputs = [], []
         for count, number in enumerate(draws.numbers):
@@ -305,11 +299,9 @@ class StandardBalancer(Balancer):
         return replace(run, findings=(ended, *self.findings(run, device)))
 
     def on_scene(self, scene: SceneFile) -> Self:
-        """Balancer of another scene; see `Balancer`."""
         return type(self)(scene_as(type(self.scene), scene), self._rotors)
 
     def rotor(self, number: int | None = None) -> CommonRotor:
-        """The scene's rotor, or that of a device; see `Balancer`."""
         scene = self.scene
         if number is not None:
             scene, _ = self._device(scene, number, run_noise(scene.run.seed, number))
@@ -324,7 +316,6 @@ class StandardBalancer(Balancer):
         )
 
     def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> Self:
-        """Balancer on another rotor; see `Balancer` and `check_rotor`."""
         if rotor.runout is not None:
             problem = f"the sensor of {rotor.source} has runout, which this balancer does not model"
             raise rotor_fault(self.scene, "vibration", problem, "a comparison without sensor.runout")
@@ -337,25 +328,23 @@ class StandardBalancer(Balancer):
         return 0.0
 
     def lasting(self, span: float) -> Self:
-        """Balancer with runs of `span`, s."""
         return type(self)(replace(self.scene, run=replace(self.scene.run, time_limit=span)), self._rotors)
 
     def quantities(self) -> tuple[Quantity, ...]:
-        """Reach; see `Balancer`."""
         reach = self.reach(self.scene)
         return (Quantity(key="reach", name="usable moment in any direction", unit="kg m", value=reach),)
 
     def rows(self, run: StandardRun) -> Rows:
         """Amplitude at the end and settling time, and the findings."""
-        simulated: dict[str, Any] = {"origin": "simulated"}
-        end, settled = float(run.amplitude[-1]), run.settling_time
+        rows = (
+            ("final_amplitude", "amplitude at the end", "m", float(run.amplitude[-1])),
+            ("settling_time", "settling time", "s", run.settling_time),
+        )
         return Rows(
             title=self.scene.name,
-            quantities=(
-                Quantity(
-                    key="final_amplitude", name="amplitude at the end", unit="m", value=end, **simulated
-                ),
-                Quantity(key="settling_time", name="settling time", unit="s", value=settled, **simulated),
+            quantities=tuple(
+                Quantity(key=key, name=name, unit=unit, value=value, origin="simulated")
+                for key, name, unit, value in rows
             ),
             findings=run.findings,
         )

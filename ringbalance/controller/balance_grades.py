@@ -1,18 +1,16 @@
-"""Residual unbalances and limits as the standards of balancing name them."""
+"""Residual unbalances and limits as ISO 21940-11 and API 617 grade them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from ringbalance.physics.balancing import api_617_unbalance, balance_grade
-
-ConventionRow = tuple[str, str, float | None, str, str]
-"""Key, name, value, unit and status of a quantity."""
+from ringbalance.results.rows import Quantity
 
 
-def grade_rows(
+def grade_quantities(
     *, mass: float | None, speed: float, residual: float, limit: float, reached_by: str
-) -> Iterator[ConventionRow]:
+) -> Iterator[Quantity]:
     """Balance quality grades of a residual unbalance and of a limit, and the residual that API 617 allows.
 
     None without the rotor's mass.  The residual in the plane of the disc is the vector sum of those in the
@@ -26,8 +24,9 @@ def grade_rows(
         ("grade_reached", f"balance quality grade reached {reached_by} (ISO 21940-11)", residual),
         ("grade_of_limit", "balance quality grade of the limit (ISO 21940-11)", limit),
     ):
-        yield key, name, balance_grade(unbalance=unbalance, mass=mass, speed=speed), "m/s", "ok"
+        grade = balance_grade(unbalance=unbalance, mass=mass, speed=speed)
+        yield Quantity.simulated(key, name, grade, "m/s")
     allowed = api_617_unbalance(mass=mass, speed=speed)
     verdict = "not exceeded" if residual <= allowed else "exceeded"
     name = f"residual unbalance of both planes that API 617 allows: {verdict} {reached_by}"
-    yield "api_617_unbalance", name, allowed, "kg m", "ok"
+    yield Quantity.simulated("api_617_unbalance", name, allowed, "kg m")

@@ -17,7 +17,6 @@ from ringbalance.scene.registry import register_function
 if TYPE_CHECKING:
     from ringbalance.calibration import calibrate as calibrate
     from ringbalance.calibration import paper_law as paper_law
-    from ringbalance.checking import check_balancer as check_balancer
     from ringbalance.controller.algorithms.algorithm import Command as Command
     from ringbalance.controller.algorithms.algorithm import Controller as Controller
     from ringbalance.controller.algorithms.algorithm import Measurement as Measurement
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
     from ringbalance.design.sweep import Sweep as Sweep
     from ringbalance.designs import objective as objective
     from ringbalance.designs import sweep as sweep
+    from ringbalance.face import check_balancer as check_balancer
     from ringbalance.face import compare as compare
     from ringbalance.face import simulate as simulate
     from ringbalance.face import tune as tune
@@ -103,7 +103,6 @@ register_function("xarray_dataset", path="xarray:Dataset")
 register_function("scene_lines", path="ringbalance.scene.describe:scene_lines")
 
 _NAMES = {
-    "checking": ("check_balancer",),
     "calibration": (
         "calibrate",
         "paper_law",
@@ -128,6 +127,7 @@ _NAMES = {
     "design.sweep": ("Sweep",),
     "designs": ("objective", "sweep"),
     "face": (
+        "check_balancer",
         "compare",
         "simulate",
         "tune",

@@ -1,4 +1,7 @@
-"""Simulation, comparison and tuning, for Python and as commands; unchecked changes of a scene are refused."""
+"""Simulation, comparison, tuning and checks of a balancer, for Python and as commands.
+
+Unchecked changes of a scene are refused.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from typing import Any, Literal, Protocol, cast, overload
 
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.balancer import AS_GIVEN, Progress, balancer_of, takes
+from ringbalance.controller.balancer_checks import CHECKS, BalancerChecks, problems_of
 from ringbalance.controller.compare import Comparison
 from ringbalance.controller.compare import compare as run_comparison
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
@@ -21,7 +25,10 @@ from ringbalance.controller.simulation import Simulation
 from ringbalance.interface import checked, law_for, opened
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.results.result import csv_text, print_rows
-from ringbalance.scene import AnyScene, Scene
+from ringbalance.scene import AnyScene, Scene, scene_from
+from ringbalance.scene.faults import COMMAND_LINE, SceneError
+from ringbalance.scene.kinds import scene_kind
+from ringbalance.scene.loader import balancer_name
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.platform.terminal import activity
 from ringbalance.scene.registry import registered
@@ -197,3 +204,37 @@ def tune(
     balancer = balancer_of(scene, flow_law=flow_law)
     tries = remedies is not False
     return tuned(balancer, scan=pressure, remedies=tries, choices=tries, progress=progress)
+
+
+@checked
+def check_balancer(
+    name: str, scene: AnyScene | None = None, *, progress: Callable[[str], None] | None = None
+) -> BalancerChecks:
+    """Check that a balancer, such as one of another package, is what every command expects.
+
+    Args: `name`: the word of the scene's key `balancer`. `scene`: one of its scenes, whose runs should be
+        short; default the example that its package brings. `progress`: called with the present check.
+    Raises: SceneError: no balancer of that name is installed, its package cannot be used, or there is no
+        scene of it.
+
+    Example:
+        >>> scene = rb.load_scene("driven_masses_small").with_values({"run.time_limit": "3 s"})
+        >>> rb.check_balancer("eccentric_mass", scene).succeeded
+        True
+    """
+    example = scene_kind(balancer_name(name, file=COMMAND_LINE, key="NAME")).example
+    if scene is None and not example:
+        problem = "its package brings no example"
+        allowed = "--scene SCENE with it"
+        raise SceneError.of_option(option="NAME", value=name, problem=problem, allowed=allowed)
+    if scene is None:
+        scene = scene_from(content=example.encode(), file=f"example of {name}")
+    elif scene.balancer != name:
+        problem, allowed = f"this is a scene of the balancer {scene.balancer}", f"a scene of {name}"
+        raise SceneError.of_option(option="--scene", value=scene.source, problem=problem, allowed=allowed)
+    balancer, problems = balancer_of(scene), []
+    for check in CHECKS:
+        if progress is not None:
+            progress(f"{check.__name__.replace('_', ' ')} ...")
+        problems.append((check, problems_of(check, balancer)))
+    return BalancerChecks(name=name, source=scene.source, problems=problems)

@@ -32,7 +32,7 @@ TARGETS: Final = {
     "trade": "ringbalance.studies:trade",
     "extremes": "ringbalance.studies:extremes_file",
     "plot": "ringbalance.reporting:plot_file",
-    "check-balancer": "ringbalance.checking:check_balancer",
+    "check-balancer": "ringbalance.face:check_balancer",
     "doctor": "ringbalance.doctor:doctor",
 }
 """Module and function of each command, imported when it runs."""

@@ -291,6 +291,13 @@ class _Group:
             for each, least in zip(self.devices, emptied, strict=True)
         ]
         usable, beyond = corners_of(np.stack(moments, axis=1), disc.chambers)
+        supplied = [
+            replace(each, gas=replace(each.gas, pressure=pressure))
+            for each, pressure in zip(self.scenes, pressures.tolist(), strict=True)
+        ]
+        parts = [part_per_gas(s, device.model) for s, device in zip(supplied, self.devices, strict=True)]
+        work = partial(compression_work, pressure_volume=1.0)
+        pressed = [(each.gas.pressure, each.gas.ambient_pressure) for each in supplied]
         return _Under(
             group=self,
             supply=pressures,
@@ -302,24 +309,8 @@ class _Group:
             runout=np.array([each.sensor.runout for each in self.scenes]),
             usable_moment=factors * moment_towards(usable, towards),
             unbalance=factors * sizes,
-            part_per_gas=np.array(
-                [
-                    part_per_gas(replace(each, gas=replace(each.gas, pressure=pressure)), device.model)
-                    for each, device, pressure in zip(
-                        self.scenes, self.devices, pressures.tolist(), strict=True
-                    )
-                ]
-            ),
-            work=np.array(
-                [
-                    compression_work(
-                        pressure_volume=1.0,
-                        pressure=pressure + each.gas.ambient_pressure,
-                        ambient_pressure=each.gas.ambient_pressure,
-                    )
-                    for pressure, each in zip(pressures.tolist(), self.scenes, strict=True)
-                ]
-            ),
+            part_per_gas=np.array(parts),
+            work=np.array([work(pressure=p + a, ambient_pressure=a) for p, a in pressed]),
         )
 
 

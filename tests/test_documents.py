@@ -168,7 +168,7 @@ def few_devices() -> Iterator[None]:
         patch.setattr(remedies_module, "_FIRST_DEVICES", 4)
         patch.setattr(tune_module, "searched", lambda *_, **__: {"controller.gas_time_offset": (1e-3,)})
         patch.setattr(search_module, "_HEATS", ((0, 4),))
-        patch.setattr(search_module, "_ROUNDS", 1)
+        patch.setattr(search_module, "_WIDE_ROUNDS", 1)
         patch.setattr(search_module, "DEVICES", 4)
         patch.setattr(search_module, "_SCAN_DRAWS", (Draws.block(64, 2), Draws.block(66, 2)))
         yield

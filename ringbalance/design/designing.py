@@ -143,6 +143,13 @@ def _in_order(space: Space, designs: Sequence[RacedDesign], needed: float) -> li
     return [designs[i] for i in order]
 
 
+def _size_half_width(fraction: Proportion, slope: float) -> float | None:
+    """Relative half-width (95 %) of a design's size: that of the difference of two fractions over `slope`,
+    their growth with the logarithm of the size, and the resolution of the search; None without growth."""
+    apart = (fraction.high - fraction.low) / math.sqrt(2.0)
+    return math.hypot(apart / slope, AS_SMALL) if slope > 0 else None
+
+
 def run_design(
     scene: SceneFile,
     *,
@@ -202,11 +209,7 @@ def run_design(
             if larger is not None and (not queue or larger.size < queue[0].size):
                 queue.insert(0, larger)
         if best is not None and space.sized:
-            # Half-width of the difference of two fractions over their growth with the logarithm of the size,
-            # and the resolution of the search.
-            fraction, slope = best.race.judgement.fraction, growth(races, best)
-            apart = (fraction.high - fraction.low) / math.sqrt(2.0)
-            doubt = math.hypot(apart / slope, AS_SMALL) if slope > 0 else None
+            doubt = _size_half_width(best.race.judgement.fraction, growth(races, best))
     reach, smaller, ranking, held = None, None, Ranking(), None
     if best is not None:
         reach = row_reach(static_rows(space.scene, [best.point], intervals=False)[0])

@@ -120,16 +120,18 @@ def _answered(scenes: Sequence[Scene], intervals: bool) -> list[Record]:
         if len(scenes) == 1:
             return [_failed(error)]
         return [row for each in scenes for row in _answered([each], intervals)]
-    rows = []
-    for regime, *column in table.T.tolist():
-        triples = zip(UNITS, column[: len(UNITS)], column[len(UNITS) :], strict=True)
-        values = {
-            name: [finite(value), finite(believed(value, width, stated=True) or 0.0)]
-            for name, value, width in triples
-        }
-        status = BLOCKED if int(regime) == Regime.BLOCKED else "ok"
-        rows.append({"values": values, "units": dict(UNITS), "status": status, "finding": None})
-    return rows
+    return [_row(column) for column in table.T]
+
+
+def _row(column: FloatArray) -> Record:
+    regime, *numbers = column.tolist()
+    triples = zip(UNITS, numbers[: len(UNITS)], numbers[len(UNITS) :], strict=True)
+    values = {
+        name: [finite(value), finite(believed(value, width, stated=True) or 0.0)]
+        for name, value, width in triples
+    }
+    status = BLOCKED if int(regime) == Regime.BLOCKED else "ok"
+    return {"values": values, "units": dict(UNITS), "status": status, "finding": None}
 
 
 def core_table(designs: Designs, *, intervals: bool) -> FloatArray:

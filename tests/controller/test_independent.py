@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.simulation import Injection, Simulation
+from ringbalance.controller.simulation import Injection, Simulation, noise_floor
 from ringbalance.physics.tube.state import tube_state
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.scene.models import Scene
@@ -294,7 +294,8 @@ def test_what_is_counted_follows_its_definition(case: tuple[str, Scene, Simulati
     pairs = list(pairwise(vectors))
     turned = [abs(b) > limit and (b * a.conjugate()).real < 0 for a, b in pairs]
     operated = [any(i.time == s.time for i in run.injections) for s in run.samples[:-1]]
-    rose = [o and abs(b) - abs(a) > run.noise_floor for o, (a, b) in zip(operated, pairs, strict=True)]
+    floor = noise_floor(scene)
+    rose = [o and abs(b) - abs(a) > floor for o, (a, b) in zip(operated, pairs, strict=True)]
     assert (run.overshoots, run.misadjustments) == (sum(turned), sum(rose))
     if run.settling_time is not None:
         assert run.amplitude[run.time >= run.settling_time].max() <= limit

@@ -236,7 +236,7 @@ def test_the_time_limit_ends_a_run_in_mid_operation(scene: Scene, model: Balance
 def test_a_tiny_period_does_not_run_for_ever(
     scene: Scene, model: BalancerModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ringbalance.controller.loop.MAX_SAMPLES", 50)
+    monkeypatch.setattr("ringbalance.controller.loop._MAX_TRACED_SAMPLES", 50)
     tiny = with_controller(scene, period=1e-9, minimum_gas_time=10.0, maximum_gas_time=20.0)
     run = simulate(tiny, model)
     assert run.outcome is Outcome.TOO_MANY_SAMPLES

@@ -41,7 +41,7 @@ from ringbalance.controller.liquid_ring.devices import Spread, rotor_like
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
 from ringbalance.controller.liquid_ring.drying import part_per_gas
 from ringbalance.controller.liquid_ring.loop_factor import loop_information
-from ringbalance.controller.liquid_ring.offers import drawn_input, remedies_of, trials, valve_choices
+from ringbalance.controller.liquid_ring.offers import drawn_input, remedies_of, trials, valves_of
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import CommonRotor, Rotors, Sensor, wrapped
 from ringbalance.controller.simulation import Simulation
@@ -194,8 +194,7 @@ class LiquidRingBalancer(Balancer):
 
     def choices(self) -> tuple[Remedy, ...]:
         """Valves that can be bought, where the scene gives none."""
-        gas = self.scene.gas
-        return valve_choices(self.scene, lag=gas.valve_lag) if gas.conductance is None else ()
+        return valves_of(self.scene)
 
     def drawn_input(self, name: str) -> DrawnInput:
         return drawn_input(name)

@@ -200,6 +200,11 @@ def valves_on_sale() -> tuple[Valve, ...]:
     )
 
 
+def valves_of(scene: Scene) -> tuple[Remedy, ...]:
+    """Valves at hand, or some that can be bought; empty for a scene that gives its valve."""
+    return valve_choices(scene, lag=scene.gas.valve_lag) if scene.gas.conductance is None else ()
+
+
 def valve_choices(scene: Scene, *, lag: float | None = None) -> tuple[Remedy, ...]:
     """Valves at hand, or some that can be bought. Args: `lag`: in place of their own, s; None: their own."""
     remedies = []

@@ -166,10 +166,10 @@ class Races:
     def nearest_grid_points(self, points: Sequence[WorkablePoint]) -> list[GridPoint | None]:
         """Settings of the nearest design that ran many devices, for each point."""
         measured = self._well_known
-        fresh, known = (
+        fresh, raced = (
             self.space.coordinates(np.array([each.shares for each in some])) for some in (points, measured)
         )
-        distance = np.linalg.norm(fresh[:, np.newaxis] - known, axis=2)
+        distance = np.linalg.norm(fresh[:, np.newaxis] - raced, axis=2)
         return [measured[i].race.grid_point for i in np.argmin(distance, axis=1).tolist()]
 
     def grid_points(self, points: Sequence[WorkablePoint]) -> list[list[GridPoint] | None]:

@@ -214,8 +214,8 @@ def coarse_settings(balancer: Balancer) -> Settings:
     if best is None:
         return {}
     # In the order of the grid after the best itself, which wins among equals.
-    beside = {near for each in space.neighbours(best) for near in (each, *space.neighbours(each))}
-    near = sorted(each for each in beside if all(abs(i - j) <= 1 for i, j in zip(each, best, strict=True)))
+    two_steps = {near for each in space.neighbours(best) for near in (each, *space.neighbours(each))}
+    near = sorted(each for each in two_steps if all(abs(i - j) <= 1 for i, j in zip(each, best, strict=True)))
     best = race([best, *(each for each in near if each != best)], _NEAR_DEVICES, sum(_COARSE_DEVICES)) or best
     return space.at(best) or {}
 

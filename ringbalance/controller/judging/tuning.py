@@ -163,6 +163,7 @@ class Tuning(Result):
         }
 
     def rows(self) -> Rows:
+        """The result as quantities, findings and tables."""
         scene = self.given
         settings = []
         for path, value in self.changes.items():

@@ -89,7 +89,8 @@ def test_axes_of_every_kind_make_the_same_points(paper_scene: Scene, valves: Pat
         ({"tube.bor": "1mm:2mm:3"}, "", "did you mean"),
         ({"tube.bore": "1mm:2kg:3"}, "", "unit of mass"),
         ({"tube.bore": "1mm:2mm"}, "", "steps"),
-        ({"tube.bore": "1mm:2mm:x"}, "", "no range"),
+        ({"tube.bore": "1mm:2mm:x"}, "", "whole and above 0"),
+        ({"tube.bore": "1mm:2mm:3:x:y"}, "", "no range"),
         ({"tube.bore": "1mm:2mm"}, "halton:8", "no sample"),
         (
             {"tube.bore": [0.7, 1.5, 2.5]},

@@ -28,13 +28,10 @@ def stuck_flags(flag: float) -> FloatArray:
     return np.full(2, flag)
 
 
-def row_of(
-    plant: PlantParameters, state: FloatArray, stuck: FloatArray, command: FloatArray, rate: float = 0.0
-) -> FloatArray:
-    """Row of the plant before a step with these voltages and this speed rate."""
+def row_of(state: FloatArray, stuck: FloatArray, command: FloatArray) -> FloatArray:
+    """Row of the plant before a step with these voltages."""
     row = plant_row((0.0, 0.0))
     row[:SIZE], row[FLAG : FLAG + 2], row[VOLTAGE : VOLTAGE + 2] = state, stuck, command
-    machine._set_inputs(plant, row, rate)
     return row
 
 
@@ -48,7 +45,7 @@ def plant_step(
     step: float,
 ) -> tuple[FloatArray, FloatArray]:
     """State and flags after one step."""
-    row = row_of(plant, state, stuck, command)
+    row = row_of(state, stuck, command)
     machine.plant_step(plant, row, speed, rate, step)
     return row[:SIZE].copy(), row[FLAG : FLAG + 2].copy()
 

@@ -1,13 +1,11 @@
 """Plant: rotor on its bearing, imbalance, two masses, motors and friction, in the rotor-fixed frame.
 
-With M = m_r + 2 m_b, b = m_b r_b, J = m_b r_b^2, U = m_im r_im, W the rotor's speed and W' its rate:
+With z = x + j y, M = m_r + 2 m_b, b = m_b r_b, J = m_b r_b^2, U = m_im r_im exp(j phi_m), e_i = exp(j phi_i),
+W the rotor's speed and W' its rate:
 
-    a_x = x'' - 2 W y' - W' y - W^2 x,    a_y = y'' + 2 W x' + W' x - W^2 y
-    M a_x + C_B (x' - W y) + K_B x = U (W^2 cos phi_m + W' sin phi_m)
-                                     + b sum[(W + phi_i')^2 cos phi_i + (W' + phi_i'') sin phi_i]
-    M a_y + C_B (y' + W x) + K_B y = U (W^2 sin phi_m - W' cos phi_m)
-                                     + b sum[(W + phi_i')^2 sin phi_i - (W' + phi_i'') cos phi_i]
-    J (phi_i'' + W') + b (-a_x sin phi_i + a_y cos phi_i) = u_i - friction_i
+    M a + C_B (z' + j W z) + K_B z = (W^2 - j W') U + b sum [(W + phi_i')^2 - j (W' + phi_i'')] e_i,
+    a = z'' + 2 j W z' + (j W' - W^2) z,
+    J (phi_i'' + W') + b Im(a e_i*) = u_i - friction_i.
 
 The motor shaft turns n = N_3 / N_1 times as fast as the mass along the track.  Without inductance and with
 i = (V - K_m n phi') / R_m the torque on the mass is
@@ -16,16 +14,21 @@ i = (V - K_m n phi') / R_m the torque on the mass is
 
 positive voltage driving the mass with the rotation.  The signs follow from K_i i = J_1 theta_1'' + T_1 on the
 motor shaft, T_2 = J_2 theta_2'' + T_3 on gear B, equal power at each mesh, and theta_1 = n phi; the inertia
-and the back-emf both oppose the motion.
+and the back-emf both oppose the motion.  The imbalance mass is a part of m_r.
 
-The imbalance mass is a part of m_r.  The state is [x, y, x', y', phi_1, phi_2, phi_1', phi_2'], angles not
-wrapped; in addition each mass has a flag: SLIDING, STUCK or LOCKED.  A locked mass is clamped to its track
-by a brake that no torque overcomes.  A step is plain loops on the real numbers of one row, state first.
+With F, all in the rotor's equation but M a and b phi'', that is M a = F - j b sum phi_k'' e_k, the rotor
+leaves the masses' equations:
+
+    sum_k A_ik phi_k'' = g_i - friction_i,    g_i = B_add V - C_add phi_i' - J W' - b / M Im(F e_i*),
+    A_ik = (J + J_add) delta_ik - b^2 / M cos(phi_i - phi_k).
 
 Dry friction is a set-valued law.  A sliding mass is braked by mu_f b (W + phi')^2.  A mass at rest on its
 track is held by any torque up to mu_f b W^2; under a larger load it breaks away in the direction of the load.
-Since phi'' enters both masses' equations, two masses at rest are treated together: the mass matrix is
+Since phi'' enters both masses' equations, two masses at rest are treated together: the mass matrix A is
 positive definite, so exactly one of the nine combinations of held, forwards and backwards is consistent.
+
+The state is [x, y, x', y', phi_1, phi_2, phi_1', phi_2'], angles not wrapped; in addition each mass has a
+flag: SLIDING, STUCK or LOCKED.  A locked mass is clamped to its track by a brake that no torque overcomes.
 
 Between events, where a mass stops, sticks or breaks away, the motion is smooth and integrated by the
 fifth-order Runge-Kutta formula of Dormand and Prince, in substeps that are short compared with the time
@@ -149,12 +152,11 @@ def rotor_record(scene: EccentricScene) -> dict[str, float | None]:
     their initial angles, rad in the rotor's frame; plain numbers.
     """
     plant = PlantParameters.of(scene)
-    left = cmath.rect(plant.unbalance, plant.phase) + plant.mass_vector(scene.masses.initial_angle)
-    constants = {"mass": plant.mass, "stiffness": plant.stiffness}
+    mass, stiffness, left = plant.mass, plant.stiffness, cmath.rect(plant.unbalance, plant.phase)
     return {
-        "critical_speed_rad_s": critical_speed(**constants),
-        "amplification_factor": amplification_factor(**constants, damping=plant.damping),
-        "locked_phase_rad": cmath.phase(left),
+        "critical_speed_rad_s": critical_speed(mass=mass, stiffness=stiffness),
+        "amplification_factor": amplification_factor(mass=mass, stiffness=stiffness, damping=plant.damping),
+        "locked_phase_rad": cmath.phase(left + plant.mass_vector(scene.masses.initial_angle)),
     }
 
 
@@ -175,12 +177,10 @@ def turned(times: FloatArray, speeds: FloatArray, time: float) -> float:
     """Angle of the rotor, the integral of its speed from time zero. Returns: rad, not wrapped."""
     angle: float = speeds[0] * min(time, times[0])
     for i in range(len(times) - 1):
-        end = min(time, times[i + 1])
-        if end > times[i]:
-            now, _ = speed_at(times, speeds, times[i])
+        length = min(time, times[i + 1]) - times[i]
+        if length > 0.0:
             slope = (speeds[i + 1] - speeds[i]) / (times[i + 1] - times[i])
-            length = end - times[i]
-            angle += now * length + 0.5 * slope * length * length
+            angle += speeds[i] * length + 0.5 * slope * length * length
     angle += speeds[-1] * max(0.0, time - times[-1])
     return angle
 
@@ -190,11 +190,8 @@ SLIDING, STUCK, LOCKED = 0.0, 1.0, 2.0
 X, Y, X_RATE, Y_RATE, ANGLE, TURN = 0, 1, 2, 3, 4, 6
 """Indices of the state in a row: displacement, m, velocity, m/s, angles, rad, and rates, rad/s."""
 SIZE: Final = 8
-FLAG, VOLTAGE = 8, 10
-_SPEED_RATE, _UNBALANCE, _TORQUE, _MOTION, _ACCELERATION, _BEFORE = 12, 13, 15, 17, 19, 21
-_FORCE, _DRIVING, _FRICTION, _COSINE, _SINE, _CROSS = 23, 25, 27, 29, 31, 33
-_TRIAL, _SLOPES, ROW_SIZE = 34, 42, 90
-"""Indices behind the state: flags and voltages, V, of both masses, then what a step works with."""
+FLAG, VOLTAGE, _TRIAL, _SLOPES, ROW_SIZE = 8, 10, 12, 20, 68
+"""Indices behind the state: flags and voltages, V, of both masses, state and slopes of a trial step."""
 
 MAX_RATE_PRODUCT: Final = 0.25
 """Largest product of a substep and the plant's fastest rate: half of it moves no angle by 1e-8 rad."""
@@ -226,106 +223,147 @@ def plant_row(angles: Pair, flag: float = STUCK) -> FloatArray:
     return row
 
 
-@in_place
-def _set_loads(plant: PlantParameters, row: FloatArray, at: int, speed: float) -> None:
-    """Write the forces on rotor and masses in the state at an index of the row.
+class _Driven(NamedTuple):
+    """Plant with what is constant within a step."""
 
-    Without the rotor's accelerations A phi'' = g - friction, with A_ij = (J + J_add) delta_ij
-    - b^2 / M cos(phi_i - phi_j) and g_i = u_i - J W' - b / M (-F_x sin phi_i + F_y cos phi_i), where F is all
-    in the rotor's equations but M a and b phi''.
-    """
-    b, rate = plant.moment, row[_SPEED_RATE]
-    x, y = row[at + X], row[at + Y]
-    force_x = speed * speed * row[_UNBALANCE] + rate * row[_UNBALANCE + 1]
-    force_y = speed * speed * row[_UNBALANCE + 1] - rate * row[_UNBALANCE]
-    force_x -= plant.damping * (row[at + X_RATE] - speed * y) + plant.stiffness * x
-    force_y -= plant.damping * (row[at + Y_RATE] + speed * x) + plant.stiffness * y
-    for i in range(2):
-        cosine, sine = math.cos(row[at + ANGLE + i]), math.sin(row[at + ANGLE + i])
-        square = (speed + row[at + TURN + i]) * (speed + row[at + TURN + i])
-        force_x += b * (square * cosine + rate * sine)
-        force_y += b * (square * sine - rate * cosine)
-        row[_COSINE + i], row[_SINE + i] = cosine, sine
-        row[_FRICTION + i] = plant.friction_arm[i] * b * square
-    for i in range(2):
-        motor = row[_TORQUE + i] - plant.drive_damping * row[at + TURN + i]
-        load = b / plant.mass * (force_y * row[_COSINE + i] - force_x * row[_SINE + i])
-        row[_DRIVING + i] = motor - plant.inertia * rate - load
-    row[_FORCE], row[_FORCE + 1] = force_x, force_y
-    cosine = row[_COSINE] * row[_COSINE + 1] + row[_SINE] * row[_SINE + 1]
-    row[_CROSS] = -b * b / plant.mass * cosine
+    plant: PlantParameters
+    speed_rate: float
+    """W', rad/s^2."""
+    unbalance: complex
+    """U, kg m."""
+    torque: Pair
+    """B_add V, N m."""
+
+
+class _Forces(NamedTuple):
+    """Forces in one state, as far as they do not depend on accelerations."""
+
+    rotor: complex
+    """F, N."""
+    direction: tuple[complex, complex]
+    """e_i."""
+    driving: Pair
+    """g_i, N m."""
+    friction: Pair
+    """Largest torque of friction, mu_f b (W + phi_i')^2, N m."""
+    coupling: float
+    """A_12, kg m^2."""
 
 
 @in_place
-def _set_accelerations(plant: PlantParameters, row: FloatArray) -> None:
-    """Write phi'' of both masses in their motions, rad/s^2, from the forces in the row."""
+def _whirl(row: FloatArray, at: int) -> tuple[complex, complex]:
+    """z, m, and z', m/s, of the state at an index of the row."""
+    return complex(row[at + X], row[at + Y]), complex(row[at + X_RATE], row[at + Y_RATE])
+
+
+@in_place
+def _direction(angle: float) -> complex:
+    return complex(math.cos(angle), math.sin(angle))
+
+
+@in_place
+def _across(vector: complex, direction: complex) -> float:
+    """Im(v e*), component of a vector across a direction."""
+    return vector.imag * direction.real - vector.real * direction.imag
+
+
+@in_place
+def _forces(driven: _Driven, row: FloatArray, at: int, speed: float) -> _Forces:
+    """Forces in the state at an index of the row."""
+    plant, rate = driven.plant, driven.speed_rate
+    b, spin, lever = plant.moment, plant.inertia * rate, plant.moment / plant.mass
+    z, velocity = _whirl(row, at)
+    first, second = _direction(row[at + ANGLE]), _direction(row[at + ANGLE + 1])
+    squares = ((speed + row[at + TURN]) ** 2, (speed + row[at + TURN + 1]) ** 2)
+    force = complex(speed**2, -rate) * driven.unbalance
+    force -= plant.damping * (velocity + complex(0.0, speed) * z) + plant.stiffness * z
+    force += b * (complex(squares[0], -rate) * first)
+    force += b * (complex(squares[1], -rate) * second)
+    driving = (
+        driven.torque[0] - plant.drive_damping * row[at + TURN] - spin - lever * _across(force, first),
+        driven.torque[1] - plant.drive_damping * row[at + TURN + 1] - spin - lever * _across(force, second),
+    )
+    friction = (plant.friction_arm[0] * b * squares[0], plant.friction_arm[1] * b * squares[1])
+    cosine = first.real * second.real + first.imag * second.imag
+    return _Forces(force, (first, second), driving, friction, -b * lever * cosine)
+
+
+@in_place
+def _accelerations(plant: PlantParameters, forces: _Forces, motion: Pair) -> Pair:
+    """phi_i'', rad/s^2, of masses in their motions: 0 for held, or the sign of the rate."""
     inertia = plant.inertia + plant.drive_inertia - plant.moment * plant.moment / plant.mass
-    first, second, cross = 0.0, 0.0, 0.0
-    if row[_MOTION] != 0.0:
-        first = row[_DRIVING] - row[_MOTION] * row[_FRICTION]
-    if row[_MOTION + 1] != 0.0:
-        second = row[_DRIVING + 1] - row[_MOTION + 1] * row[_FRICTION + 1]
-    if row[_MOTION] * row[_MOTION + 1] != 0.0:
-        cross = row[_CROSS]
+    first = forces.driving[0] - motion[0] * forces.friction[0] if motion[0] != 0.0 else 0.0
+    second = forces.driving[1] - motion[1] * forces.friction[1] if motion[1] != 0.0 else 0.0
+    cross = forces.coupling if motion[0] * motion[1] != 0.0 else 0.0
     determinant = inertia * inertia - cross * cross
-    row[_ACCELERATION] = (inertia * first - cross * second) / determinant
-    row[_ACCELERATION + 1] = (inertia * second - cross * first) / determinant
+    return (inertia * first - cross * second) / determinant, (inertia * second - cross * first) / determinant
 
 
 @in_place
-def _slips(row: FloatArray, mass: int) -> bool:
-    """Return True if a held mass breaks loose: |g - A_12 phi''_other| > mu_f b W^2."""
-    load = abs(row[_DRIVING + mass] - row[_CROSS] * row[_ACCELERATION + 1 - mass])
-    return bool(load > row[_FRICTION + mass] * (1.0 + _ROUNDING))
+def _breaks_away(row: FloatArray, forces: _Forces, motion: Pair, acceleration: Pair) -> bool:
+    """Return True if friction cannot hold a mass at rest: |g_i - A_12 phi_k''| > mu_f b W^2."""
+    loose = False
+    for i in range(2):
+        load = abs(forces.driving[i] - forces.coupling * acceleration[1 - i])
+        held = motion[i] == 0.0 and row[FLAG + i] != LOCKED
+        loose = loose or (held and load > forces.friction[i] * (1.0 + _ROUNDING))
+    return loose
 
 
 @in_place
-def _set_motion(plant: PlantParameters, row: FloatArray) -> None:
-    """Write flags and motions, 0 for held or the sign of the rate; one of nine combinations is consistent."""
+def _tried(flag: float, rate: float, way: int) -> float:
+    """Motion of a mass; of one at rest the way that is tried, 0 for held, 1 for forwards, 2 for backwards."""
+    if flag == LOCKED:
+        return 0.0
+    if rate != 0.0:
+        return 1.0 if rate > 0.0 else -1.0
+    return 1.0 if way == 1 else -0.5 * way
+
+
+@in_place
+def _motion(plant: PlantParameters, forces: _Forces, row: FloatArray) -> Pair:
+    """Write the flags and return the motions, the one of nine combinations that is consistent."""
+    motion = (0.0, 0.0)
     # The tenth trial, held again, is reached by round-off only: the torques are at their bounds.
     for trial in range(10):
-        consistent = True
+        motion = (
+            _tried(row[FLAG], row[TURN], trial // 3 % 3),
+            _tried(row[FLAG + 1], row[TURN + 1], trial % 3),
+        )
+        acceleration = _accelerations(plant, forces, motion)
+        consistent = not _breaks_away(row, forces, motion, acceleration)
         for i in range(2):
-            way = (trial // 3) % 3 if i == 0 else trial % 3
-            row[_MOTION + i] = 1.0 if way == 1 else -0.5 * way
-            if row[FLAG + i] == LOCKED:
-                row[_MOTION + i] = 0.0
-            elif row[TURN + i] != 0.0:
-                row[_MOTION + i] = 1.0 if row[TURN + i] > 0.0 else -1.0
-        _set_accelerations(plant, row)
-        for i in range(2):
-            if row[FLAG + i] != LOCKED and row[TURN + i] == 0.0:
-                slipping = row[_MOTION + i] == 0.0 and _slips(row, i)
-                if slipping or row[_MOTION + i] * row[_ACCELERATION + i] < 0.0:
-                    consistent = False
+            if row[TURN + i] == 0.0 and motion[i] * acceleration[i] < 0.0:
+                consistent = False
         if consistent:
             break
     for i in range(2):
         if row[FLAG + i] != LOCKED:
-            row[FLAG + i] = STUCK if row[_MOTION + i] == 0.0 else SLIDING
+            row[FLAG + i] = STUCK if motion[i] == 0.0 else SLIDING
+    return motion
 
 
 @in_place
-def _set_slope(plant: PlantParameters, row: FloatArray, at: int, speed: float, out: int) -> None:
-    """Write the time derivative of the state at one index to another, for the motions in the row."""
-    _set_loads(plant, row, at, speed)
-    _set_accelerations(plant, row)
-    first, second = row[_ACCELERATION], row[_ACCELERATION + 1]
-    pull_x = plant.moment * (row[_SINE] * first + row[_SINE + 1] * second)
-    pull_y = plant.moment * (row[_COSINE] * first + row[_COSINE + 1] * second)
-    x, y, rate = row[at + X], row[at + Y], row[_SPEED_RATE]
-    turning_x = 2 * speed * row[at + Y_RATE] + rate * y + speed * speed * x
-    turning_y = 2 * speed * row[at + X_RATE] + rate * x - speed * speed * y
-    row[out + X], row[out + Y] = row[at + X_RATE], row[at + Y_RATE]
-    row[out + X_RATE] = (row[_FORCE] + pull_x) / plant.mass + turning_x
-    row[out + Y_RATE] = (row[_FORCE + 1] - pull_y) / plant.mass - turning_y
-    for i in range(2):
-        row[out + ANGLE + i], row[out + TURN + i] = row[at + TURN + i], row[_ACCELERATION + i]
+def _set_slope(driven: _Driven, motion: Pair, row: FloatArray, speed: float, out: int) -> None:
+    """Write the time derivative of the trial to an index of the row, for masses in their motions.
+
+    z'' = (F - j b sum phi_i'' e_i) / M - 2 j W z' + (W^2 - j W') z.
+    """
+    plant, forces = driven.plant, _forces(driven, row, _TRIAL, speed)
+    first, second = _accelerations(plant, forces, motion)
+    z, velocity = _whirl(row, _TRIAL)
+    pull = complex(0.0, plant.moment) * (first * forces.direction[0] + second * forces.direction[1])
+    turning = complex(0.0, 2 * speed) * velocity - complex(speed**2, -driven.speed_rate) * z
+    acceleration = (forces.rotor - pull) / plant.mass - turning
+    row[out + X], row[out + Y] = velocity.real, velocity.imag
+    row[out + X_RATE], row[out + Y_RATE] = acceleration.real, acceleration.imag
+    row[out + ANGLE], row[out + ANGLE + 1] = row[_TRIAL + TURN], row[_TRIAL + TURN + 1]
+    row[out + TURN], row[out + TURN + 1] = first, second
 
 
 @in_place
-def _smooth(plant: PlantParameters, row: FloatArray, speed: float, step: float) -> None:
-    """Write the state one step later as trial, for unchanged motions of the masses."""
+def _try(driven: _Driven, motion: Pair, row: FloatArray, speed: float, step: float) -> bool:
+    """Write the state one step later as trial; return True if a mass has stopped or broken away in it."""
     for stage in range(7):
         for i in range(SIZE):
             total = 0.0
@@ -333,55 +371,39 @@ def _smooth(plant: PlantParameters, row: FloatArray, speed: float, step: float) 
                 total += _COUPLING[stage, earlier] * row[_SLOPES + SIZE * earlier + i]
             row[_TRIAL + i] = row[i] + step * total
         if stage < 6:
-            now = speed + row[_SPEED_RATE] * step * _TIMES[stage]
-            _set_slope(plant, row, _TRIAL, now, _SLOPES + SIZE * stage)
-
-
-@in_place
-def _has_event(plant: PlantParameters, row: FloatArray, speed: float) -> bool:
-    """Return True if a mass has stopped or broken away in the trial."""
-    holds = False
+            now = speed + driven.speed_rate * step * _TIMES[stage]
+            _set_slope(driven, motion, row, now, _SLOPES + SIZE * stage)
     for i in range(2):
-        if row[_MOTION + i] * row[_TRIAL + TURN + i] < 0.0:
+        if motion[i] * row[_TRIAL + TURN + i] < 0.0:
             return True
-        holds = holds or (row[_MOTION + i] == 0.0 and row[FLAG + i] != LOCKED)
-    if not holds:
-        return False
-    _set_loads(plant, row, _TRIAL, speed)
-    _set_accelerations(plant, row)
-    loose = False
-    for i in range(2):
-        loose = loose or (row[_MOTION + i] == 0.0 and row[FLAG + i] != LOCKED and _slips(row, i))
-    return loose
+    forces = _forces(driven, row, _TRIAL, speed + driven.speed_rate * step)
+    return _breaks_away(row, forces, motion, _accelerations(driven.plant, forces, motion))
 
 
 @in_place
-def _advance(plant: PlantParameters, row: FloatArray, speed: float, step: float) -> None:
+def _advance(driven: _Driven, row: FloatArray, speed: float, step: float) -> None:
     """Integrate state and flags over one substep; each event ends a part of it, at the time just after."""
-    done, rate = 0.0, row[_SPEED_RATE]
+    done = 0.0
     for event in range(_MAX_EVENTS):
-        now, left = speed + rate * done, step - done
-        _set_loads(plant, row, 0, now)
-        _set_motion(plant, row)
-        _smooth(plant, row, now, left)
-        cut = event < _MAX_EVENTS - 1 and _has_event(plant, row, now + rate * left)
+        now, left = speed + driven.speed_rate * done, step - done
+        motion = _motion(driven.plant, _forces(driven, row, 0, now), row)
+        cut = _try(driven, motion, row, now, left) and event < _MAX_EVENTS - 1
         if cut:
             before, after = 0.0, left
             for _ in range(_BISECTIONS):
                 middle = 0.5 * (before + after)
                 if not before < middle < after:
                     break
-                _smooth(plant, row, now, middle)
-                if _has_event(plant, row, now + rate * middle):
+                if _try(driven, motion, row, now, middle):
                     after = middle
                 else:
                     before = middle
-            _smooth(plant, row, now, after)
+            _try(driven, motion, row, now, after)
             done += after
         for i in range(SIZE):
             row[i] = row[_TRIAL + i]
         for i in range(2):
-            if cut and row[_MOTION + i] * row[TURN + i] < 0.0:
+            if cut and motion[i] * row[TURN + i] < 0.0:
                 row[TURN + i] = 0.0
         if not cut or done >= step:
             return
@@ -407,12 +429,7 @@ def substeps(plant: PlantParameters, speed: float, rate: float, step: float) -> 
 
 
 @in_place
-def _length(x: float, y: float) -> float:
-    return math.sqrt(x * x + y * y)
-
-
-@in_place
-def _held_step(plant: PlantParameters, row: FloatArray, speed: float, step: float) -> bool:
+def _held_step(driven: _Driven, row: FloatArray, speed: float, step: float) -> bool:
     """Integrate the rotor over one step if both masses are certainly held; return True if so.
 
     The deviation from the steady whirl, seen in the fixed frame, obeys D'' + 2 h D' + k D = 0: with
@@ -420,8 +437,9 @@ def _held_step(plant: PlantParameters, row: FloatArray, speed: float, step: floa
     In both cases D is a sum of parts d_1, d_2 that do not grow, so that |s_1|^2 |d_1| + |s_2|^2 |d_2|, with
     the roots s = -h +- j w, bounds the track's acceleration, and with it the load on friction, from now on.
     """
-    if row[_SPEED_RATE] != 0.0 or speed == 0.0 or row[TURN] != 0.0 or row[TURN + 1] != 0.0:
+    if driven.speed_rate != 0.0 or speed == 0.0 or row[TURN] != 0.0 or row[TURN + 1] != 0.0:
         return False
+    plant = driven.plant
     half, square = 0.5 * plant.damping / plant.mass, plant.stiffness / plant.mass
     root = math.sqrt(abs(square - half * half))
     spring, drag = plant.stiffness - plant.mass * speed * speed, plant.damping * speed
@@ -429,42 +447,31 @@ def _held_step(plant: PlantParameters, row: FloatArray, speed: float, step: floa
     # The closed form divides by w; without damping there is no steady whirl at the critical speed.
     if size == 0.0 or root <= _LEAST_ROOT * half:
         return False
-    moment_x, moment_y, pressure = row[_UNBALANCE], row[_UNBALANCE + 1], plant.moment * speed * speed
-    for i in range(2):
-        row[_COSINE + i], row[_SINE + i] = math.cos(row[ANGLE + i]), math.sin(row[ANGLE + i])
-        moment_x, moment_y = (
-            moment_x + plant.moment * row[_COSINE + i],
-            moment_y + plant.moment * row[_SINE + i],
-        )
-    steady_x = speed * speed * (moment_x * spring + moment_y * drag) / size
-    steady_y = speed * speed * (moment_y * spring - moment_x * drag) / size
-    x, y = row[X] - steady_x, row[Y] - steady_y
-    a_x, a_y = row[X_RATE] - speed * y + half * x, row[Y_RATE] + speed * x + half * y
+    direction = (_direction(row[ANGLE]), _direction(row[ANGLE + 1]))
+    moment = driven.unbalance + plant.moment * direction[0] + plant.moment * direction[1]
+    steady = speed * speed * (moment * complex(spring, -drag)) / size
+    (z, velocity), turning = _whirl(row, 0), complex(0.0, speed)
+    d = z - steady
+    a = velocity + turning * d + half * d
     if square > half * half:
-        both = _length(a_x - root * y, a_y + root * x) + _length(a_x + root * y, a_y - root * x)
-        pull, decay = 0.5 * square * both / root, math.exp(-half * step)
+        aside = complex(0.0, root) * d
+        pull, decay = 0.5 * square * (abs(a + aside) + abs(a - aside)) / root, math.exp(-half * step)
         cosine, sine = decay * math.cos(root * step), decay * math.sin(root * step) / root
     else:
         slow, fast = root - half, -root - half
-        pull = slow * slow * _length(a_x + root * x, a_y + root * y)
-        pull = 0.5 * (pull + fast * fast * _length(a_x - root * x, a_y - root * y)) / root
+        pull = 0.5 * (slow * slow * abs(a + root * d) + fast * fast * abs(a - root * d)) / root
         slow, fast = math.exp(slow * step), math.exp(fast * step)
         cosine, sine = 0.5 * (slow + fast), 0.5 * (slow - fast) / root
+    pressure = plant.moment * speed * speed
     for i in range(2):
-        across = steady_y * row[_COSINE + i] - steady_x * row[_SINE + i]
-        load = abs(row[_TORQUE + i] + pressure * across) + plant.moment * pull
+        load = abs(driven.torque[i] + pressure * _across(steady, direction[i])) + plant.moment * pull
         if row[FLAG + i] != LOCKED and not load <= plant.friction_arm[i] * pressure:
             return False
-    later_x, later_y = cosine * x + sine * a_x, cosine * y + sine * a_y
-    shift = (half * half - square) * sine
-    rate_x = cosine * a_x + shift * x - half * later_x + speed * later_y
-    rate_y = cosine * a_y + shift * y - half * later_y - speed * later_x
-    cosine, sine = math.cos(speed * step), math.sin(speed * step)
-    row[X], row[Y] = (
-        steady_x + cosine * later_x + sine * later_y,
-        steady_y + cosine * later_y - sine * later_x,
-    )
-    row[X_RATE], row[Y_RATE] = cosine * rate_x + sine * rate_y, cosine * rate_y - sine * rate_x
+    later = cosine * d + sine * a
+    rate = cosine * a + (half * half - square) * sine * d - half * later - turning * later
+    back = complex(math.cos(speed * step), -math.sin(speed * step))
+    z, velocity = steady + back * later, back * rate
+    row[X], row[Y], row[X_RATE], row[Y_RATE] = z.real, z.imag, velocity.real, velocity.imag
     for i in range(2):
         if row[FLAG + i] != LOCKED:
             row[FLAG + i] = STUCK
@@ -472,17 +479,14 @@ def _held_step(plant: PlantParameters, row: FloatArray, speed: float, step: floa
 
 
 @in_place
-def _set_inputs(plant: PlantParameters, row: FloatArray, speed_rate: float) -> None:
-    """Write what is constant within a step: speed rate, imbalance, torques of the motors at standstill."""
-    row[_SPEED_RATE] = speed_rate
-    row[_UNBALANCE] = plant.unbalance * math.cos(plant.phase)
-    row[_UNBALANCE + 1] = plant.unbalance * math.sin(plant.phase)
+def _driven(plant: PlantParameters, row: FloatArray, speed_rate: float) -> _Driven:
+    """Limit the voltages, stop locked masses, and return the plant of this step."""
     for i in range(2):
-        voltage = min(max(row[VOLTAGE + i], -plant.maximum_voltage), plant.maximum_voltage)
-        row[VOLTAGE + i], row[_TORQUE + i] = voltage, plant.drive_gain * voltage
-        row[_BEFORE + i] = row[ANGLE + i]
+        row[VOLTAGE + i] = min(max(row[VOLTAGE + i], -plant.maximum_voltage), plant.maximum_voltage)
         if row[FLAG + i] == LOCKED:
             row[TURN + i] = 0.0
+    torque = (plant.drive_gain * row[VOLTAGE], plant.drive_gain * row[VOLTAGE + 1])
+    return _Driven(plant, speed_rate, plant.unbalance * _direction(plant.phase), torque)
 
 
 @in_place
@@ -497,13 +501,13 @@ def plant_step(
     Source: Dormand and Prince (1980), the fifth-order formula; Kirchhoff's law for the motor without
     inductance, Eqs. (A1) to (A3) of the paper on eccentric masses.
     """
-    _set_inputs(plant, row, speed_rate)
-    if not _held_step(plant, row, speed, step):
+    driven, before = _driven(plant, row, speed_rate), (row[ANGLE], row[ANGLE + 1])
+    if not _held_step(driven, row, speed, step):
         parts = substeps(plant, speed, speed_rate, step)
         for part in range(parts):
-            _advance(plant, row, speed + speed_rate * (step / parts) * part, step / parts)
+            _advance(driven, row, speed + speed_rate * (step / parts) * part, step / parts)
     energy = 0.0
     for i in range(2):
-        back = plant.back_emf_constant * plant.gear_ratio * (row[ANGLE + i] - row[_BEFORE + i])
+        back = plant.back_emf_constant * plant.gear_ratio * (row[ANGLE + i] - before[i])
         energy += row[VOLTAGE + i] * (row[VOLTAGE + i] * step - back) / plant.resistance
     return energy

@@ -152,9 +152,10 @@ def test_the_order_is_five(parameters: PlantParameters) -> None:
         count = round(1.0 / step)
         state = rest_state(ANGLES)
         state[6:] = [1.0, -0.5]
-        row = row_of(smooth, state, stuck_flags(SLIDING), np.array([1.0, -2.0]), rate=3.0)
+        row = row_of(state, stuck_flags(SLIDING), np.array([1.0, -2.0]))
+        driven = machine._driven(smooth, row, 3.0)
         for i in range(count):
-            machine._advance(smooth, row, 12.0 + 3.0 * i * step, step)
+            machine._advance(driven, row, 12.0 + 3.0 * i * step, step)
         return row[:8]
 
     steps = np.array([1 / 80, 1 / 160, 1 / 320])
@@ -188,7 +189,7 @@ def test_electrical_energy_is_the_integral_of_power(parameters: PlantParameters)
     step, count = 1e-4, 5000
     command = np.array([3.0, -2.0])
     free = without_friction(parameters)
-    row, total = row_of(free, rest_state(ANGLES), stuck_flags(SLIDING), command), 0.0
+    row, total = row_of(rest_state(ANGLES), stuck_flags(SLIDING), command), 0.0
     rates = [row[6:8].copy()]
     for _ in range(count):
         total += machine.plant_step(free, row, 10.0, 0.0, step)
@@ -197,7 +198,7 @@ def test_electrical_energy_is_the_integral_of_power(parameters: PlantParameters)
     assert total == pytest.approx(np.sum((power[1:] + power[:-1]) / 2) * step, rel=1e-6)
 
     def held(plant: PlantParameters) -> float:
-        row = row_of(plant, rest_state(ANGLES), stuck_flags(LOCKED), command)
+        row = row_of(rest_state(ANGLES), stuck_flags(LOCKED), command)
         return machine.plant_step(plant, row, 10.0, 0.0, 2.0)
 
     assert held(free) == pytest.approx((9 + 4) * 2.0)

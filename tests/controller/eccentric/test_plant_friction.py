@@ -198,23 +198,13 @@ def test_friction_never_gives_energy(parameters: PlantParameters) -> None:
     assert energy[-1] < 0.1 * energy[0]
 
 
-def accelerations_in(
-    parameters: PlantParameters, row: FloatArray, motion: tuple[float, float]
-) -> tuple[float, float]:
-    """phi'' of both masses in a motion, from the loads in the row."""
-    row[machine._MOTION : machine._MOTION + 2] = motion
-    machine._set_accelerations(parameters, row)
-    return float(row[machine._ACCELERATION]), float(row[machine._ACCELERATION + 1])
-
-
-def consistent_motions(parameters: PlantParameters, row: FloatArray) -> Iterator[tuple[float, float]]:
+def consistent_motions(parameters: PlantParameters, forces: machine._Forces) -> Iterator[tuple[float, float]]:
     """Accelerations in all combinations that the law of friction allows, by its definition."""
-    most, driving = row[machine._FRICTION :], row[machine._DRIVING :]
     inertia = parameters.inertia + parameters.drive_inertia - parameters.moment**2 / parameters.mass
     for motion in product((0.0, 1.0, -1.0), (0.0, 1.0, -1.0)):
-        a = accelerations_in(parameters, row, motion)
-        needed = [driving[i] - inertia * a[i] - row[machine._CROSS] * a[1 - i] for i in range(2)]
-        held = all(abs(needed[i]) <= most[i] for i in range(2) if motion[i] == 0)
+        a = machine._accelerations(parameters, forces, motion)
+        needed = [forces.driving[i] - inertia * a[i] - forces.coupling * a[1 - i] for i in range(2)]
+        held = all(abs(needed[i]) <= forces.friction[i] for i in range(2) if motion[i] == 0)
         if held and all(motion[i] * a[i] > 0 for i in range(2) if motion[i] != 0):
             yield a
 
@@ -232,27 +222,26 @@ def test_the_motion_from_rest_is_the_one_that_the_law_allows(
     parameters: PlantParameters,
 ) -> None:
     unit = parameters._replace(inertia=1.0, drive_inertia=0.0, mass=1e12)
-    row = row_of(unit, rest_state((0.0, 1.0)), stuck_flags(STUCK), OFF)
-    row[machine._DRIVING : machine._DRIVING + 2], row[machine._CROSS] = driving, cross
-    row[machine._FRICTION : machine._FRICTION + 2] = friction
-    machine._set_motion(unit, row)
-    chosen = row[machine._ACCELERATION : machine._ACCELERATION + 2].copy()
-    moves = row[machine._MOTION : machine._MOTION + 2] != 0
+    row = row_of(rest_state((0.0, 1.0)), stuck_flags(STUCK), OFF)
+    forces = machine._Forces(0j, (1 + 0j, 1 + 0j), driving, friction, cross)
+    motion = machine._motion(unit, forces, row)
+    chosen = machine._accelerations(unit, forces, motion)
+    moves = np.array(motion) != 0
     np.testing.assert_array_equal(row[machine.FLAG : machine.FLAG + 2], np.where(moves, SLIDING, STUCK))
     # At the bound of the torque two motions are the same: what counts is the acceleration.
-    for allowed in consistent_motions(unit, row):
+    for allowed in consistent_motions(unit, forces):
         assert allowed == pytest.approx(chosen, abs=1e-9)
 
 
 def carried(parameters: PlantParameters, row: FloatArray, speed: float, time: float) -> FloatArray:
     """The state of held masses by an adaptive solution of the plant's own equations."""
-    work = row.copy()
-    work[machine._MOTION : machine._MOTION + 2] = 0.0
+    work, out = row.copy(), machine._SLOPES
+    driven = machine._driven(parameters, work, 0.0)
 
     def rates(_: float, now: FloatArray) -> FloatArray:
-        work[:8] = now
-        machine._set_slope(parameters, work, 0, speed, machine._SLOPES)
-        return work[machine._SLOPES : machine._SLOPES + 8].copy()
+        work[machine._TRIAL : machine._TRIAL + 8] = now
+        machine._set_slope(driven, (0.0, 0.0), work, speed, out)
+        return work[out : out + 8].copy()
 
     solution = solve_ivp(rates, (0.0, time), row[:8], method="DOP853", rtol=1e-12, atol=1e-16)
     return np.asarray(solution.y[:, -1])
@@ -264,9 +253,9 @@ def test_a_step_with_held_masses_is_exact(damping: float, parameters: PlantParam
     rotor = parameters._replace(damping=damping, friction_arm=(1e3, 1e3))
     speed, state = 150 * RPM, rest_state((0.4, 2.9))
     state[:4] = 1e-3, -2e-3, 0.01, 0.02
-    row = row_of(rotor, state, stuck_flags(SLIDING), np.array([0.01, -0.02]))
+    row = row_of(state, stuck_flags(SLIDING), np.array([0.01, -0.02]))
     expected = carried(rotor, row, speed, 0.3)
-    assert machine._held_step(rotor, row, speed, 0.3)
+    assert machine._held_step(machine._driven(rotor, row, 0.0), row, speed, 0.3)
     np.testing.assert_allclose(row[:8], expected, rtol=1e-9, atol=1e-13)
     assert np.all(row[machine.FLAG : machine.FLAG + 2] == STUCK)
 
@@ -280,12 +269,13 @@ def test_the_bound_on_the_load_of_held_masses_holds(damping: float, parameters: 
     while arm > 1e-5:
         arm *= 0.9
         rotor = parameters._replace(damping=damping, friction_arm=(arm, arm))
-        row = row_of(rotor, state, stuck_flags(STUCK), OFF)
-        if not machine._held_step(rotor, row.copy(), speed, 1e-3):
+        row = row_of(state, stuck_flags(STUCK), OFF)
+        driven = machine._driven(rotor, row, 0.0)
+        if not machine._held_step(driven, row.copy(), speed, 1e-3):
             break
         held += 1
         for _ in range(2000):
-            machine._advance(rotor, row, speed, 1e-3)
+            machine._advance(driven, row, speed, 1e-3)
             assert np.all(row[machine.FLAG : machine.FLAG + 2] == STUCK), arm
     assert held > 3
     assert arm > 1e-5
@@ -301,10 +291,11 @@ def test_masses_that_the_transient_could_break_loose_are_not_taken_as_held(
     rotor = parameters._replace(friction_arm=(arm, arm))
     settled, shaken = at_rest_on(rotor, speed, angles), rest_state(angles)
     stuck, step = stuck_flags(STUCK), 1e-3
-    assert machine._held_step(rotor, row_of(rotor, settled, stuck, OFF), speed, step)
-    before = row_of(rotor, shaken, stuck, OFF)
+    driven = machine._driven(rotor, row_of(shaken, stuck, OFF), 0.0)
+    assert machine._held_step(driven, row_of(settled, stuck, OFF), speed, step)
+    before = row_of(shaken, stuck, OFF)
     row = before.copy()
-    assert not machine._held_step(rotor, row, speed, step)
-    assert not machine._held_step(rotor, row_of(rotor, shaken, stuck, OFF, rate=1.0), speed, step)
+    assert not machine._held_step(driven, row, speed, step)
+    assert not machine._held_step(driven._replace(speed_rate=1.0), row_of(shaken, stuck, OFF), speed, step)
     np.testing.assert_array_equal(row[:10], before[:10])
-    assert machine._held_step(rotor, row_of(rotor, shaken, stuck_flags(LOCKED), OFF), speed, step)
+    assert machine._held_step(driven, row_of(shaken, stuck_flags(LOCKED), OFF), speed, step)

@@ -66,8 +66,9 @@ from ringbalance.results.requirements import AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.draws import run_noise
-from ringbalance.scene.origins import SceneFile, with_values_at
+from ringbalance.scene.origins import SceneFile, value_at, with_values_at
 
+_GAINS: Final = ("lqr.state_weight", "friction_filter.speed_gain", "friction_filter.pair_gain")
 _LEAST_NOISE_FRACTION: Final = 0.01
 """Smallest sensor noise that the filter assumes, as a fraction of the amplitude limit."""
 _WHIRL_DECAY_TIMES: Final = 12.0
@@ -96,19 +97,9 @@ class EccentricMassBalancer(Balancer):
 
     def settings(self) -> tuple[Setting, ...]:
         """Gains of the drives, each with the scene's value and its bounds."""
-        lqr, friction = self.scene.lqr, self.scene.friction_filter
-        values = {
-            "lqr.state_weight": lqr.state_weight,
-            "friction_filter.speed_gain": friction.speed_gain,
-            "friction_filter.pair_gain": friction.pair_gain,
-        }
+        values = {path: value_at(self.scene, path) for path in _GAINS}
         return tuple(
-            Setting(
-                path=path,
-                value=value,
-                lowest=value / _MAX_GAIN_FACTOR,
-                highest=value * _MAX_GAIN_FACTOR,
-            )
+            Setting(path=path, value=value, lowest=value / _MAX_GAIN_FACTOR, highest=value * _MAX_GAIN_FACTOR)
             for path, value in values.items()
             if value > 0
         )
@@ -286,11 +277,8 @@ class EccentricMassBalancer(Balancer):
             allowed = "a lag_angle above 0 deg and below 180 deg, the greater the lighter the rotor"
             raise rotor_fault(scene, "rotor.stiffness", problem, allowed)
         # The strategy waits until the vibration from the rotor's start has died away.
-        start, step = (
-            _WHIRL_DECAY_TIMES * 2 * (after.mass + 2 * scene.masses.mass) / after.damping,
-            scene.sensor.step,
-        )
-        start = math.ceil(start / step) * step
+        step, whole = scene.sensor.step, after.mass + 2 * scene.masses.mass
+        start = math.ceil(_WHIRL_DECAY_TIMES * 2 * whole / after.damping / step) * step
         angle = scene.masses.initial_angle[0]
         # The filter's noises and its rotor change as the sensor and the rotor do.
         keys, mass_ratio = scene.imbalance_filter, mass / own_mass
@@ -330,10 +318,8 @@ class EccentricMassBalancer(Balancer):
 
     def lasting(self, span: float) -> EccentricMassBalancer:
         """Balancer with runs that balance for `span`, s."""
-        limit = span + self.scene.supervisor.start
-        return EccentricMassBalancer(
-            replace(self.scene, run=replace(self.scene.run, time_limit=limit)), self._rotors
-        )
+        run = replace(self.scene.run, time_limit=span + self.scene.supervisor.start)
+        return EccentricMassBalancer(replace(self.scene, run=run), self._rotors)
 
     def information(self, scene: SceneFile) -> Information:
         """Loops of the drives."""

@@ -144,20 +144,13 @@ def imbalance_filter(settings: FilterSettings, *, speeds: npt.ArrayLike) -> Filt
     (1978); Eqs. 14 and 17 of the paper on eccentric masses, the latter without the imbalance in its printed
     last row, on which the velocity does not depend.
     """
-    plateaus = np.atleast_1d(np.asarray(speeds, dtype=np.float64))
-    count = plateaus.size
-    transition, process, observation = (
-        np.empty((count, 6, 6)),
-        np.empty((count, 6, 6)),
-        np.zeros((count, 4, 6)),
-    )
-    power, decay = (
-        np.diag([0.0, settings.acceleration_noise, settings.imbalance_noise]),
-        settings.model.damping,
-    )
-    halvings = max(math.ceil(math.log2(max(decay / settings.model.mass * settings.step, 1.0))), 0)
+    plateaus, model = np.atleast_1d(np.asarray(speeds, dtype=np.float64)), settings.model
+    transition, process = np.empty((2, plateaus.size, 6, 6))
+    observation = np.zeros((plateaus.size, 4, 6))
+    power = np.diag([0.0, settings.acceleration_noise, settings.imbalance_noise])
+    halvings = math.ceil(math.log2(max(model.damping / model.mass * settings.step, 1.0)))
     for i, w in enumerate(plateaus):
-        generator = _generator(settings.model, w)
+        generator = _generator(model, w)
         block = np.block([[-generator, power], [np.zeros((3, 3)), generator.conj().T]])
         exponential = expm(block * (settings.step / 2**halvings))
         exact = exponential[3:, 3:].conj().T
@@ -252,20 +245,14 @@ def predict(constants: FilterConstants, estimate: Record, masses: MassInput) -> 
     """
     x, p, half, (xx, xy, yy) = estimate.state, estimate.covariance, estimate.half, masses.covariance
     a, q = constants.transition[estimate.plateau], constants.process[estimate.plateau]
-    drive = (
-        x[0] - 0.5 * masses.drift.real,
-        x[1] - 0.5 * masses.drift.imag,
-        x[2],
-        x[3],
-        x[4] + masses.imbalance.real,
-        x[5] + masses.imbalance.imag,
-    )
+    shift = 0.5 * masses.drift
+    x[0], x[1] = x[0] - shift.real, x[1] - shift.imag
+    drive = (x[0], x[1], x[2], x[3], x[4] + masses.imbalance.real, x[5] + masses.imbalance.imag)
     for i in range(4):
         x[i] = 0.0
         for k in range(6):
             x[i] += a[i, k] * drive[k]
-    x[0] -= 0.5 * masses.drift.real
-    x[1] -= 0.5 * masses.drift.imag
+    x[0], x[1] = x[0] - shift.real, x[1] - shift.imag
     # P <- A P A^T + Q, symmetric to the last bit, in plain loops: at this size a library call does not pay.
     for i in range(6):
         for k in range(6):
@@ -347,28 +334,22 @@ def imbalance_history(
     """
     if constants.speed[0] == 0:
         raise ValueError("a rotor at rest shows no imbalance: the speed must not be zero")
-    states, covariances = np.empty((len(samples), 6)), np.empty((len(samples), 6, 6))
-    estimate = np.zeros(1, dtype=IMBALANCE_FILTER)[0]
-    begin_filter(estimate, constants)
+    history = np.zeros(len(samples) + 1, dtype=IMBALANCE_FILTER)
+    begin_filter(history[0], constants)
     measured = np.ascontiguousarray(samples, dtype=np.float64)
-    _history(constants, estimate, measured, variance, masses or locked_masses(0.0j), states, covariances)
-    return states, covariances
+    _fill(constants, measured, variance, masses or locked_masses(0.0j), history)
+    return history["state"][1:], history["covariance"][1:]
 
 
 @in_place
-def _history(
-    constants: FilterConstants,
-    estimate: Record,
-    samples: FloatArray,
-    variance: FloatArray,
-    masses: MassInput,
-    states: FloatArray,
-    covariances: FloatArray,
+def _fill(
+    constants: FilterConstants, samples: FloatArray, variance: FloatArray, masses: MassInput, history: Record
 ) -> None:
     for i in range(samples.shape[0]):
+        estimate = history[i + 1]
+        for j in range(6):
+            estimate.state[j] = history[i].state[j]
+            for k in range(6):
+                estimate.covariance[j, k] = history[i].covariance[j, k]
         predict(constants, estimate, masses)
         correct(constants, estimate, samples[i], variance)
-        for j in range(6):
-            states[i, j] = estimate.state[j]
-            for k in range(6):
-                covariances[i, j, k] = estimate.covariance[j, k]

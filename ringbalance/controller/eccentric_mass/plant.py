@@ -48,6 +48,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.integrate import RK45
 
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.physics.balancing import amplification_factor, critical_speed
@@ -197,22 +198,9 @@ MAX_RATE_PRODUCT: Final = 0.25
 """Largest product of a substep and the plant's fastest rate: half of it moves no angle by 1e-8 rad."""
 _BISECTIONS, _MAX_EVENTS = 40, 64
 _ROUNDING, _LEAST_ROOT = 1e-12, 1e-6
-_COUPLING: Final = np.array(
-    [
-        [0, 0, 0, 0, 0, 0],
-        [1 / 5, 0, 0, 0, 0, 0],
-        [3 / 40, 9 / 40, 0, 0, 0, 0],
-        [44 / 45, -56 / 15, 32 / 9, 0, 0, 0],
-        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0, 0],
-        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0],
-        [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
-    ]
-)
-"""Weights of the earlier stages in each of the six stages, and in the result of order 5.
-
-Source: Dormand and Prince, "A family of embedded Runge-Kutta formulae", J. Comp. Appl. Math. 6 (1980).
-"""
-_TIMES: Final = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0])
+_COUPLING: Final = np.vstack([np.pad(RK45.A, ((0, 0), (0, 1))), RK45.B])
+"""Weights of the earlier stages in each of the six stages, and in the result of order 5."""
+_TIMES: Final = RK45.C
 """Times of the stages, as fractions of the step."""
 
 

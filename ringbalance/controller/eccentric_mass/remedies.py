@@ -28,7 +28,7 @@ _SIZE_FACTORS: Final = (1.05, 1.5)
 """Masses to try, over the mass that cancels the imbalance of nearly every device; radii likewise."""
 _SIZING_QUANTILE: Final = 0.99
 """Quantile of the devices' imbalances by which masses are sized."""
-_NOISE_FACTORS: Final = {"": (0.5, 0.25), "finer_": (0.05,)}
+_NOISE_FACTORS: Final = (("", 0.5), ("", 0.25), ("finer_", 0.05))
 """Sensor noises to try, over the present noise; a twentieth is tried even if half helps no device."""
 _WAIT_FACTORS: Final = (0.5, 0.25, 0.125)
 """Waiting times before averaging to try, over the present one: they set the strategy's pace."""
@@ -120,9 +120,7 @@ def remedies_of(
     for code, paths in () if _BLIND.isdisjoint(sample.ended) else _SENSORS.items():
         values = {path: value_at(scene, path) for path in paths}
         if any(value > 0 for path, value in values.items() if path.startswith("sensor.")):
-            for prefix, factor in (
-                (prefix, each) for prefix, some in _NOISE_FACTORS.items() for each in some
-            ):
+            for prefix, factor in _NOISE_FACTORS:
                 finer = {path: factor * value for path, value in values.items() if value > 0}
                 yield Remedy(code=prefix + code, changes=finer)
     # A limit at the required residual; or at what runs reach, if below the vibration before balancing.

@@ -163,55 +163,54 @@ def _substeps_of(scene: EccentricScene) -> float:
     Raises: SceneError: more than `MAX_SAMPLES`, or more than `MAX_SUBSTEPS`; it names the key of the fastest
     rate and what is allowed.
     """
-    duration, plant = scene.run.time_limit, PlantParameters.of(scene)
+    duration, step, plant = scene.run.time_limit, scene.sensor.step, PlantParameters.of(scene)
     times, speeds = scene.rotor.profile
     instants = np.linspace(0.0, duration, min(scene.samples, 10_000))
     rates = np.abs(np.interp(instants, times, speeds)) + fastest_rate(plant, 0.0)
-    each = np.maximum(np.ceil(rates * scene.sensor.step / MAX_RATE_PRODUCT), 1.0)
-    count = scene.samples * float(np.mean(each))
-    samples = duration / scene.sensor.step + 1
-    if samples > MAX_SAMPLES:
-        path, value, dimension, unit = "run.time_limit", duration, "time", "s"
-        problem = f"the run would take {samples:.3g} samples, and {MAX_SAMPLES:.3g} are the most"
-        allowed = f"at most {scene.sensor.step * (MAX_SAMPLES - 1):.4g} s, or a longer sensor.step"
-    elif count > MAX_SUBSTEPS:
+    count = scene.samples * float(np.mean(np.maximum(np.ceil(rates * step / MAX_RATE_PRODUCT), 1.0)))
+    if scene.samples <= MAX_SAMPLES and count <= MAX_SUBSTEPS:
+        return count
+    if scene.samples > MAX_SAMPLES:
+        key, dimension, value, unit = "run.time_limit", "time", duration, "s"
+        taken, allowed = (
+            f"{scene.samples:.3g} samples, and {MAX_SAMPLES:.3g}",
+            f"at most {step * (MAX_SAMPLES - 1):.4g} s, or a longer sensor.step",
+        )
+    else:
         # Half of the allowed substeps: the other rates need the rest.
-        rate, resistance = 0.5 * MAX_SUBSTEPS * MAX_RATE_PRODUCT / duration, scene.motor.resistance
-        least = plant.inertia + plant.drive_inertia - 2 * plant.moment**2 / plant.mass
-        drive, fastest = plant.drive_damping / least, float(np.max(np.abs(speeds)))
-        rates_of = [
+        rate, mass, resistance = (
+            0.5 * MAX_SUBSTEPS * MAX_RATE_PRODUCT / duration,
+            plant.mass,
+            scene.motor.resistance,
+        )
+        drive = plant.drive_damping / (plant.inertia + plant.drive_inertia - 2 * plant.moment**2 / mass)
+        fastest = float(np.max(np.abs(speeds)))
+        _, key, dimension, value, limit, unit = max(
             (
-                math.sqrt(plant.stiffness / plant.mass),
+                math.sqrt(plant.stiffness / mass),
                 "rotor.stiffness",
-                plant.stiffness,
-                plant.mass * rate**2,
                 "stiffness",
+                plant.stiffness,
+                mass * rate**2,
                 "N/m",
             ),
-            (
-                0.5 * plant.damping / plant.mass,
-                "rotor.damping",
-                plant.damping,
-                plant.mass * rate,
-                "damping",
-                "N*s/m",
-            ),
-            (fastest, "rotor.speed_profile", fastest, rate, "speed", "rpm"),
-            (drive, "motor.resistance", resistance, resistance * drive / rate, "resistance", "ohm"),
-        ]
-        _, path, value, limit, dimension, unit = max(rates_of)
-        problem = (
-            f"the run would take {count:.3g} steps of the integration, and {MAX_SUBSTEPS:.3g} are the most"
+            (plant.damping / mass, "rotor.damping", "damping", plant.damping, mass * rate, "N*s/m"),
+            (fastest, "rotor.speed_profile", "speed", fastest, rate, "rpm"),
+            (drive, "motor.resistance", "resistance", resistance, resistance * drive / rate, "ohm"),
         )
+        taken = f"{count:.3g} steps of the integration, and {MAX_SUBSTEPS:.3g}"
         bound = "at least" if unit == "ohm" else "at most"
         allowed = f"{bound} {format_quantity(limit, dimension, unit, digits=3)}, or a shorter run.time_limit"
-    else:
-        return count
-    table, _, key = path.partition(".")
-    text = format_quantity(value, dimension, unit)
-    raise SceneError(
-        [Fault(file=scene.file, table=table, key=key, value=text, problem=problem, allowed=allowed)]
+    table, _, name = key.partition(".")
+    fault = Fault(
+        file=scene.file,
+        table=table,
+        key=name,
+        value=format_quantity(value, dimension, unit),
+        problem=f"the run would take {taken} are the most",
+        allowed=allowed,
     )
+    raise SceneError([fault])
 
 
 def simulate_eccentric(

@@ -20,6 +20,7 @@ from ringbalance.controller.eccentric_mass.plant import Pair, PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.origins import value_at
 
 GAIN_MARGIN: Final = 2.0
 """Factor by which the recommended gains could be higher before a pole leaves the unit circle."""
@@ -89,19 +90,19 @@ class RecommendedGains:
         volt, track = plant.drive_gain, track_model(scene)
         regulator = _judged(
             scene,
-            *("regulator", "lqr.state_weight", "", lqr.state_weight),
+            *("regulator", "lqr.state_weight", ""),
             gain=lambda weight: lqr_gain(track, state_weight=weight, input_weight=lqr.input_weight),
             eased=False,
         )
         speed = _judged(
             scene,
-            *("speed control", "friction_filter.speed_gain", "V*s/rad", keys.speed_gain),
+            *("speed control", "friction_filter.speed_gain", "V*s/rad"),
             gain=lambda speed_gain: (0.0, volt * speed_gain),
         )
         slower = min(speed.value, speed.recommended)
         pair = _judged(
             scene,
-            *("pair control", "friction_filter.pair_gain", "V/rad", keys.pair_gain),
+            *("pair control", "friction_filter.pair_gain", "V/rad"),
             # Both drives act on the angle between the masses.
             gain=lambda pair_gain: (2 * volt * pair_gain, 0.0),
             other_rate=volt * keys.speed_gain,
@@ -129,7 +130,6 @@ def _judged(
     name: str,
     key: str,
     unit: str,
-    value: float,
     *,
     gain: Callable[[float], Pair],
     eased: bool = True,
@@ -144,7 +144,7 @@ def _judged(
     loop as judged; `recommended_rate`: in that of a recommended value. `start`: value from which this is
     searched; default the scene's.
     """
-    step, track = scene.lqr.step, track_model(scene)
+    value, step, track = value_at(scene, key), scene.lqr.step, track_model(scene)
     yielding = 2 * track.moment**2 / (PlantParameters.of(scene).mass * track.inertia)
     inertia, ratio = track.inertia * (1 - yielding), 1 - yielding if eased else 1.0
     compensated = yielding * track.damping if eased else 0.0
@@ -188,13 +188,13 @@ def _margin(without: FloatArray, closed: FloatArray) -> float:
     Jury's conditions det(1 + A) > 0 and det A < 1 are linear in the factor; p(1) > 0 holds for any gain.
     """
     unit = np.eye(len(closed))
-    pairs = [
-        (float(np.linalg.det(unit + without)), float(np.linalg.det(unit + closed))),
-        (1.0 - float(np.linalg.det(without)), 1.0 - float(np.linalg.det(closed))),
-    ]
-    if min(before for before, _ in pairs) < -_ROUNDING:
+    before, after = (
+        (float(np.linalg.det(unit + loop)), 1.0 - float(np.linalg.det(loop))) for loop in (without, closed)
+    )
+    if min(before) < -_ROUNDING:
         return 0.0
-    return min((max(a, 0.0) / (a - b) for a, b in pairs if b < a - _ROUNDING), default=math.inf)
+    falling = (pair for pair in zip(before, after, strict=True) if pair[1] < pair[0] - _ROUNDING)
+    return min((max(a, 0.0) / (a - b) for a, b in falling), default=math.inf)
 
 
 def _largest(margin: Callable[[float], float], start: float) -> float:

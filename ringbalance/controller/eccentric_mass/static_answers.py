@@ -6,6 +6,7 @@ of its rate; a fast one passes a critical speed with less vibration.
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterator
 from itertools import pairwise
@@ -89,32 +90,22 @@ def holding_margin(scene: EccentricScene) -> float | None:
 
 def static_quantities(scene: EccentricScene) -> Iterator[Quantity]:
     """Answers that need no run."""
-    plant, reach, start = PlantParameters.of(scene), reach_of(scene), starting_speed(scene)
-    yield Quantity(key="reach", name="usable moment in any direction", unit="kg m", value=reach)
-    if plant.unbalance:
-        yield Quantity(
-            key="reach_ratio", name="usable moment over imbalance", unit="1", value=reach / plant.unbalance
-        )
-    stall, holding = stall_ratio(scene), holding_margin(scene)
-    for key, name, value in (
-        ("stall_ratio", "stall torque over need", stall),
-        ("holding_margin", "friction over load once balanced, at least", holding),
-    ):
-        if value is not None:
-            yield Quantity(key=key, name=name, unit="1", value=value)
-    angles = scene.masses.initial_angle
-    moments = [plant.unbalance, plant.moment, plant.moment]
-    vector = sum(
-        moment * np.exp(1j * angle) for moment, angle in zip(moments, (plant.phase, *angles), strict=True)
-    )
+    plant, reach = PlantParameters.of(scene), reach_of(scene)
+    vector = cmath.rect(plant.unbalance, plant.phase) + plant.mass_vector(scene.masses.initial_angle)
     locked = largest_whirl_per_imbalance(scene) * abs(vector)
-    finest = whirl_per_imbalance(scene, start) * 2 * plant.moment * DriveLaw.of(scene).near
-    for key, name, value in (
-        ("locked_amplitude", "vibration with locked masses over the speed profile, at most", locked),
-        ("resolution", "vibration that masses at rest near their goals leave, at most", finest),
+    near = 2 * plant.moment * DriveLaw.of(scene).near
+    finest = whirl_per_imbalance(scene, starting_speed(scene)) * near
+    ratio = reach / plant.unbalance if plant.unbalance else None
+    for key, name, unit, value in (
+        ("reach", "usable moment in any direction", "kg m", reach),
+        ("reach_ratio", "usable moment over imbalance", "1", ratio),
+        ("stall_ratio", "stall torque over need", "1", stall_ratio(scene)),
+        ("holding_margin", "friction over load once balanced, at least", "1", holding_margin(scene)),
+        ("locked_amplitude", "vibration with locked masses over the speed profile, at most", "m", locked),
+        ("resolution", "vibration that masses at rest near their goals leave, at most", "m", finest),
     ):
-        if math.isfinite(value):
-            yield Quantity(key=key, name=name, unit="m", value=value)
+        if value is not None and math.isfinite(value):
+            yield Quantity(key=key, name=name, unit=unit, value=value)
 
 
 def _ramps(scene: EccentricScene, after: float) -> Iterator[tuple[FloatArray, float]]:

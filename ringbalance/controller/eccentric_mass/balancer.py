@@ -265,8 +265,7 @@ class EccentricMassBalancer(Balancer):
         scene, before = self.scene, self.scene.rotor
         own_mass = before.mass + 2 * scene.masses.mass
         mass = own_mass if rotor.mass is None else rotor.mass
-        lighter = replace(scene, rotor=replace(before, mass=mass - 2 * scene.masses.mass))
-        plant = on_rotor(lighter, rotor)
+        plant = on_rotor(with_values_at(scene, {"rotor.mass": mass - 2 * scene.masses.mass}), rotor)
         after = plant.rotor
         if after.mass <= 0 or abs(rotor.unbalance) > after.mass * scene.imbalance.radius:
             problem = "these masses, or the imbalance, are heavier than the rotor itself"
@@ -284,28 +283,24 @@ class EccentricMassBalancer(Balancer):
         keys, mass_ratio = scene.imbalance_filter, mass / own_mass
         noise = max(rotor.noise, _LEAST_NOISE_FRACTION * rotor.limit)
         louder, stiffer = noise / keys.position_noise, after.stiffness / before.stiffness
-        mounted = replace(
-            plant,
-            sensor=replace(
-                scene.sensor, position_noise=rotor.noise, velocity_noise=rotor.noise * rotor.speed
-            ),
-            imbalance_filter=replace(
-                keys,
-                position_noise=noise,
-                velocity_noise=noise * rotor.speed,
-                velocity_walk=keys.velocity_walk * louder * stiffer / mass_ratio,
-                unbalance_walk=keys.unbalance_walk * louder * mass_ratio,
-                assumed_mass=keys.assumed_mass * (after.mass / before.mass),
-                assumed_stiffness=keys.assumed_stiffness * stiffer,
-                assumed_damping=after.damping
-                if before.damping == 0
-                else keys.assumed_damping * (after.damping / before.damping),
-            ),
-            masses=replace(scene.masses, initial_angle=(angle, angle + math.pi)),
-            supervisor=replace(scene.supervisor, limit=rotor.limit, start=start),
-            requirement=EccentricRequirement(fraction=scene.requirement.fraction),
-            run=replace(scene.run, time_limit=scene.run.time_limit + start),
-        )
+        damping = keys.assumed_damping * (after.damping / before.damping) if before.damping else after.damping
+        values = {
+            "sensor.position_noise": rotor.noise,
+            "sensor.velocity_noise": rotor.noise * rotor.speed,
+            "imbalance_filter.position_noise": noise,
+            "imbalance_filter.velocity_noise": noise * rotor.speed,
+            "imbalance_filter.velocity_walk": keys.velocity_walk * louder * stiffer / mass_ratio,
+            "imbalance_filter.unbalance_walk": keys.unbalance_walk * louder * mass_ratio,
+            "imbalance_filter.assumed_mass": keys.assumed_mass * (after.mass / before.mass),
+            "imbalance_filter.assumed_stiffness": keys.assumed_stiffness * stiffer,
+            "imbalance_filter.assumed_damping": damping,
+            "masses.initial_angle": (angle, angle + math.pi),
+            "supervisor.limit": rotor.limit,
+            "supervisor.start": start,
+            "run.time_limit": scene.run.time_limit + start,
+        }
+        requirement = EccentricRequirement(fraction=scene.requirement.fraction)
+        mounted = replace(with_values_at(plant, values), requirement=requirement)
         return EccentricMassBalancer(mounted, rotors)
 
     def sampling_time(self) -> float:
@@ -318,8 +313,8 @@ class EccentricMassBalancer(Balancer):
 
     def lasting(self, span: float) -> EccentricMassBalancer:
         """Balancer with runs that balance for `span`, s."""
-        run = replace(self.scene.run, time_limit=span + self.scene.supervisor.start)
-        return EccentricMassBalancer(replace(self.scene, run=run), self._rotors)
+        end = {"run.time_limit": span + self.scene.supervisor.start}
+        return EccentricMassBalancer(with_values_at(self.scene, end), self._rotors)
 
     def information(self, scene: SceneFile) -> Information:
         """Loops of the drives."""

@@ -10,16 +10,16 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
-from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, EccentricScene, SpeedPoint
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
 from ringbalance.controller.eccentric_mass.targets import reach_of
 from ringbalance.controller.rotor import CommonRotor, Rotors
 from ringbalance.scene.draws import deviates, quantiles
-from ringbalance.scene.origins import InputUncertainty, moved_at
+from ringbalance.scene.origins import InputUncertainty, moved_at, with_values_at
 from ringbalance.scene.uncertain import NORMAL_95
 
 ASSUMED_AMPLITUDE: Final = 0.05
@@ -104,17 +104,11 @@ def on_rotor(scene: EccentricScene, rotor: CommonRotor) -> EccentricScene:
     K_B = M W^2 + Re(W^2/alpha), C_B = Im(W^2/alpha)/W, with the mass M of rotor and both masses.
     """
     mass, dynamic = PlantParameters.of(scene).mass, rotor.speed**2 / rotor.influence
-    return replace(
-        scene,
-        rotor=EccentricRotor(
-            mass=scene.rotor.mass,
-            stiffness=mass * rotor.speed**2 + dynamic.real,
-            damping=dynamic.imag / rotor.speed,
-            speed_profile=(SpeedPoint(time=0.0, speed=rotor.speed),),
-        ),
-        imbalance=replace(
-            scene.imbalance,
-            mass=abs(rotor.unbalance) / scene.imbalance.radius,
-            phase=cmath.phase(rotor.unbalance),
-        ),
-    )
+    values = {
+        "rotor.stiffness": mass * rotor.speed**2 + dynamic.real,
+        "rotor.damping": dynamic.imag / rotor.speed,
+        "rotor.speed_profile": (SpeedPoint(time=0.0, speed=rotor.speed),),
+        "imbalance.mass": abs(rotor.unbalance) / scene.imbalance.radius,
+        "imbalance.phase": cmath.phase(rotor.unbalance),
+    }
+    return with_values_at(scene, values)

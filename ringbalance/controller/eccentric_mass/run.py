@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -48,6 +47,7 @@ from ringbalance.controller.eccentric_mass.step import begin_strategy, strategy_
 from ringbalance.results.result import Presentation
 from ringbalance.scene.arrays import FloatArray, Record
 from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.origins import value_at, with_values_at
 from ringbalance.scene.platform.compiled import compiled
 from ringbalance.scene.units import format_quantity
 
@@ -171,45 +171,30 @@ def _substeps_of(scene: EccentricScene) -> float:
     if scene.samples <= MAX_SAMPLES and count <= MAX_SUBSTEPS:
         return count
     if scene.samples > MAX_SAMPLES:
-        key, dimension, value, unit = "run.time_limit", "time", duration, "s"
-        taken, allowed = (
-            f"{scene.samples:.3g} samples, and {MAX_SAMPLES:.3g}",
-            f"at most {step * (MAX_SAMPLES - 1):.4g} s, or a longer sensor.step",
-        )
+        path, value, dimension, unit = "run.time_limit", duration, "time", "s"
+        taken = f"{scene.samples:.3g} samples, and {MAX_SAMPLES:.3g}"
+        allowed = f"at most {step * (MAX_SAMPLES - 1):.4g} s, or a longer sensor.step"
     else:
         # Half of the allowed substeps: the other rates need the rest.
-        rate, mass, resistance = (
-            0.5 * MAX_SUBSTEPS * MAX_RATE_PRODUCT / duration,
-            plant.mass,
-            scene.motor.resistance,
-        )
+        rate, mass = 0.5 * MAX_SUBSTEPS * MAX_RATE_PRODUCT / duration, plant.mass
         drive = plant.drive_damping / (plant.inertia + plant.drive_inertia - 2 * plant.moment**2 / mass)
         fastest = float(np.max(np.abs(speeds)))
-        _, key, dimension, value, limit, unit = max(
-            (
-                math.sqrt(plant.stiffness / mass),
-                "rotor.stiffness",
-                "stiffness",
-                plant.stiffness,
-                mass * rate**2,
-                "N/m",
-            ),
-            (plant.damping / mass, "rotor.damping", "damping", plant.damping, mass * rate, "N*s/m"),
-            (fastest, "rotor.speed_profile", "speed", fastest, rate, "rpm"),
-            (drive, "motor.resistance", "resistance", resistance, resistance * drive / rate, "ohm"),
-        )
+        rates_and_limits = {
+            "rotor.stiffness": (math.sqrt(plant.stiffness / mass), mass * rate**2, "N/m"),
+            "rotor.damping": (plant.damping / mass, mass * rate, "N*s/m"),
+            "rotor.speed_profile": (fastest, rate, "rpm"),
+            "motor.resistance": (drive, scene.motor.resistance * drive / rate, "ohm"),
+        }
+        path = max(rates_and_limits, key=lambda each: rates_and_limits[each][0])
+        _, limit, unit = rates_and_limits[path]
+        value = fastest if unit == "rpm" else value_at(scene, path)
+        dimension = "speed" if unit == "rpm" else path.partition(".")[2]
         taken = f"{count:.3g} steps of the integration, and {MAX_SUBSTEPS:.3g}"
         bound = "at least" if unit == "ohm" else "at most"
         allowed = f"{bound} {format_quantity(limit, dimension, unit, digits=3)}, or a shorter run.time_limit"
-    table, _, name = key.partition(".")
-    fault = Fault(
-        file=scene.file,
-        table=table,
-        key=name,
-        value=format_quantity(value, dimension, unit),
-        problem=f"the run would take {taken} are the most",
-        allowed=allowed,
-    )
+    table, _, key = path.partition(".")
+    problem, text = f"the run would take {taken} are the most", format_quantity(value, dimension, unit)
+    fault = Fault(file=scene.file, table=table, key=key, value=text, problem=problem, allowed=allowed)
     raise SceneError([fault])
 
 
@@ -260,4 +245,4 @@ def simulate_eccentric(
 
 def locked_run(scene: EccentricScene) -> EccentricRun:
     """Run the rotor without balancing: masses clamped at their initial angles."""
-    return simulate_eccentric(replace(scene, supervisor=replace(scene.supervisor, strategy="locked")))
+    return simulate_eccentric(with_values_at(scene, {"supervisor.strategy": "locked"}))

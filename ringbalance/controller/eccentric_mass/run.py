@@ -181,7 +181,7 @@ def _substeps_of(scene: EccentricScene) -> float:
         fastest = float(np.max(np.abs(speeds)))
         rates_and_limits = {
             "rotor.stiffness": (math.sqrt(plant.stiffness / mass), mass * rate**2, "N/m"),
-            "rotor.damping": (plant.damping / mass, mass * rate, "N*s/m"),
+            "rotor.damping": (0.5 * plant.damping / mass, mass * rate, "N*s/m"),
             "rotor.speed_profile": (fastest, rate, "rpm"),
             "motor.resistance": (drive, scene.motor.resistance * drive / rate, "ohm"),
         }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import cmath
+
 import numpy as np
 
 from ringbalance.controller.eccentric_mass import plant as machine
@@ -33,6 +35,12 @@ def row_of(state: FloatArray, stuck: FloatArray, command: FloatArray) -> FloatAr
     row = plant_row((0.0, 0.0))
     row[:SIZE], row[FLAG : FLAG + 2], row[VOLTAGE : VOLTAGE + 2] = state, stuck, command
     return row
+
+
+def driven_of(plant: PlantParameters, row: FloatArray, rate: float = 0.0) -> machine._Driven:
+    """Plant under the voltages of a row, at this speed rate."""
+    first, second = (plant.drive_gain * row[VOLTAGE : VOLTAGE + 2]).tolist()
+    return machine._Driven(plant, rate, cmath.rect(plant.unbalance, plant.phase), (first, second))
 
 
 def plant_step(

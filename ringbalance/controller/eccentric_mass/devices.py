@@ -12,6 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+from operator import mul
 from typing import Final
 
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
@@ -62,10 +63,10 @@ def device(scene: EccentricScene, number: int, rotors: Rotors | None = None) -> 
     for uncertain in stated:
         name, normal, width = uncertain.quantity, draw(uncertain.quantity), uncertain.half_width
         if uncertain.relative:
-            move = partial(_scaled, exponent=math.log1p(width) * normal)
+            move = partial(mul, math.exp(math.log1p(width) * normal))
         else:
             move = partial(_moved, change=width * normal, linear=name == PHASE)
-        # Both entries of a list get the same change, except those that were fitted.
+        # Both entries of a list are one quantity and get the same change, except those that were fitted.
         entries = [f"{name}[{i}]" for i in (0, 1)]
         alone = [path for path in entries if path not in fitted_paths]
         for path in [name] if len(alone) == 2 else alone:
@@ -87,10 +88,6 @@ def imbalance_ratios(scene: EccentricScene, rotors: Rotors | None = None) -> lis
     """Imbalance over the largest that the masses cancel, of many devices without a run."""
     scenes = (device(scene, number, rotors).scene for number in range(_SIZING_DEVICES))
     return [each.imbalance.mass * each.imbalance.radius / reach_of(each) for each in scenes]
-
-
-def _scaled(value: float, exponent: float) -> float:
-    return value * math.exp(exponent)
 
 
 def _moved(value: float, change: float, *, linear: bool) -> float:

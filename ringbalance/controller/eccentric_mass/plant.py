@@ -467,17 +467,6 @@ def _held_step(driven: _Driven, row: FloatArray, speed: float, step: float) -> b
 
 
 @in_place
-def _driven(plant: PlantParameters, row: FloatArray, speed_rate: float) -> _Driven:
-    """Limit the voltages, stop locked masses, and return the plant of this step."""
-    for i in range(2):
-        row[VOLTAGE + i] = min(max(row[VOLTAGE + i], -plant.maximum_voltage), plant.maximum_voltage)
-        if row[FLAG + i] == LOCKED:
-            row[TURN + i] = 0.0
-    torque = (plant.drive_gain * row[VOLTAGE], plant.drive_gain * row[VOLTAGE + 1])
-    return _Driven(plant, speed_rate, plant.unbalance * _direction(plant.phase), torque)
-
-
-@in_place
 def plant_step(
     plant: PlantParameters, row: FloatArray, speed: float, speed_rate: float, step: float
 ) -> float:
@@ -489,7 +478,13 @@ def plant_step(
     Source: Dormand and Prince (1980), the fifth-order formula; Kirchhoff's law for the motor without
     inductance, Eqs. (A1) to (A3) of the paper on eccentric masses.
     """
-    driven, before = _driven(plant, row, speed_rate), (row[ANGLE], row[ANGLE + 1])
+    for i in range(2):
+        row[VOLTAGE + i] = min(max(row[VOLTAGE + i], -plant.maximum_voltage), plant.maximum_voltage)
+        if row[FLAG + i] == LOCKED:
+            row[TURN + i] = 0.0
+    torque = (plant.drive_gain * row[VOLTAGE], plant.drive_gain * row[VOLTAGE + 1])
+    before = (row[ANGLE], row[ANGLE + 1])
+    driven = _Driven(plant, speed_rate, plant.unbalance * _direction(plant.phase), torque)
     if not _held_step(driven, row, speed, step):
         parts = substeps(plant, speed, speed_rate, step)
         for part in range(parts):

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from eccentric_runs import bundled
-from plant_runs import rest_state, row_of, run_steps, stuck_flags
+from plant_runs import driven_of, rest_state, row_of, run_steps, stuck_flags
 from scipy.integrate import solve_ivp
 
 from ringbalance.controller.eccentric_mass import plant as machine
@@ -153,7 +153,7 @@ def test_the_order_is_five(parameters: PlantParameters) -> None:
         state = rest_state(ANGLES)
         state[6:] = [1.0, -0.5]
         row = row_of(state, stuck_flags(SLIDING), np.array([1.0, -2.0]))
-        driven = machine._driven(smooth, row, 3.0)
+        driven = driven_of(smooth, row, 3.0)
         for i in range(count):
             machine._advance(driven, row, 12.0 + 3.0 * i * step, step)
         return row[:8]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plant_runs import plant_step, rest_state, row_of, run_steps, stuck_flags
+from plant_runs import driven_of, plant_step, rest_state, row_of, run_steps, stuck_flags
 from scipy.integrate import solve_ivp
 
 from ringbalance.controller.eccentric_mass import plant as machine
@@ -236,7 +236,7 @@ def test_the_motion_from_rest_is_the_one_that_the_law_allows(
 def carried(parameters: PlantParameters, row: FloatArray, speed: float, time: float) -> FloatArray:
     """The state of held masses by an adaptive solution of the plant's own equations."""
     work, out = row.copy(), machine._SLOPES
-    driven = machine._driven(parameters, work, 0.0)
+    driven = driven_of(parameters, work)
 
     def rates(_: float, now: FloatArray) -> FloatArray:
         work[machine._TRIAL : machine._TRIAL + 8] = now
@@ -255,7 +255,7 @@ def test_a_step_with_held_masses_is_exact(damping: float, parameters: PlantParam
     state[:4] = 1e-3, -2e-3, 0.01, 0.02
     row = row_of(state, stuck_flags(SLIDING), np.array([0.01, -0.02]))
     expected = carried(rotor, row, speed, 0.3)
-    assert machine._held_step(machine._driven(rotor, row, 0.0), row, speed, 0.3)
+    assert machine._held_step(driven_of(rotor, row), row, speed, 0.3)
     np.testing.assert_allclose(row[:8], expected, rtol=1e-9, atol=1e-13)
     assert np.all(row[machine.FLAG : machine.FLAG + 2] == STUCK)
 
@@ -270,7 +270,7 @@ def test_the_bound_on_the_load_of_held_masses_holds(damping: float, parameters: 
         arm *= 0.9
         rotor = parameters._replace(damping=damping, friction_arm=(arm, arm))
         row = row_of(state, stuck_flags(STUCK), OFF)
-        driven = machine._driven(rotor, row, 0.0)
+        driven = driven_of(rotor, row)
         if not machine._held_step(driven, row.copy(), speed, 1e-3):
             break
         held += 1
@@ -291,7 +291,7 @@ def test_masses_that_the_transient_could_break_loose_are_not_taken_as_held(
     rotor = parameters._replace(friction_arm=(arm, arm))
     settled, shaken = at_rest_on(rotor, speed, angles), rest_state(angles)
     stuck, step = stuck_flags(STUCK), 1e-3
-    driven = machine._driven(rotor, row_of(shaken, stuck, OFF), 0.0)
+    driven = driven_of(rotor, row_of(shaken, stuck, OFF))
     assert machine._held_step(driven, row_of(settled, stuck, OFF), speed, step)
     before = row_of(shaken, stuck, OFF)
     row = before.copy()

@@ -276,8 +276,8 @@ class EccentricMassBalancer(Balancer):
             allowed = "a lag_angle above 0 deg and below 180 deg, the greater the lighter the rotor"
             raise rotor_fault(scene, "rotor.stiffness", problem, allowed)
         # The strategy waits until the vibration from the rotor's start has died away.
-        step, whole = scene.sensor.step, after.mass + 2 * scene.masses.mass
-        start = math.ceil(_WHIRL_DECAY_TIMES * 2 * whole / after.damping / step) * step
+        step, total_mass = scene.sensor.step, after.mass + 2 * scene.masses.mass
+        start = math.ceil(_WHIRL_DECAY_TIMES * 2 * total_mass / after.damping / step) * step
         angle = scene.masses.initial_angle[0]
         # The filter's noises and its rotor change as the sensor and the rotor do.
         keys, mass_ratio = scene.imbalance_filter, mass / own_mass

@@ -5,7 +5,7 @@ For the same scene file, seed and versions everything but `times` and `provenanc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from datetime import date
 from functools import partial
@@ -14,10 +14,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import AS_GIVEN, Draws, balancer_of
+from ringbalance.controller.balancer import AS_GIVEN, Draws, RunResult, balancer_of
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, rotor_record
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_rows import amplitude_band
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, loops_document
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
 from ringbalance.controller.eccentric_mass.static_answers import (
@@ -60,6 +59,7 @@ Progress = Callable[[str], None]
 FORMAT: Final = 1
 _BAND_DEVICES: Final = 64
 """Number of drawn devices, those of the verdict, whose vibration makes a band."""
+_BAND_INSTANTS: Final = 600
 _LAW_FILLS: Final = 51
 _RUN_UP_SPEEDS: Final = 1001
 
@@ -230,9 +230,34 @@ def _eccentric_study(scene: EccentricScene) -> Record:
         "locked": locked_run(scene).to_dict(),
         "rotor": rotor_record(scene),
         "tuning": loops_document(RecommendedGains.of(scene)),
-        "drawn": amplitude_band(devices, end=scene.run.time_limit),
+        "drawn": _amplitude_band(devices, end=scene.run.time_limit),
         "known": [each.document() for each in static_quantities(scene)],
         "run_up": _run_up_record(scene),
+    }
+
+
+def _amplitude_band(runs: Iterable[RunResult], *, end: float) -> Record:
+    """Smallest, median and largest amplitude of runs at equally spaced times; the amplitude of a run is its
+    maximum since the time before, so that no peak is lost.
+
+    Args: `end`: last of the times, s. Returns: Plain numbers for JSON, SI; a run that ended before has its
+        last value.
+    """
+    time = np.linspace(0.0, end, _BAND_INSTANTS)
+    peaks, settled = [], 0
+    for result in runs:
+        run, settled = result.run, settled + result.settled
+        edges = np.minimum(np.searchsorted(run.time, time), run.time.size - 1)
+        since = np.concatenate([edges[:1], edges[:-1]])
+        peaks.append([run.amplitude[a : max(b, a) + 1].max() for a, b in zip(since, edges, strict=True)])
+    low, middle, high = (row.tolist() for row in np.quantile(np.array(peaks), [0.0, 0.5, 1.0], axis=0))
+    return {
+        "time_s": time.tolist(),
+        "low_m": low,
+        "middle_m": middle,
+        "high_m": high,
+        "runs": len(peaks),
+        "settled": settled,
     }
 
 

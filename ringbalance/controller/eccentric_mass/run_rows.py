@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.balancer import RunResult
 from ringbalance.controller.document import amplitude_line
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.results.numbers import format_given
@@ -21,7 +20,6 @@ from ringbalance.scene.uncertain import NORMAL_95
 
 _DOCUMENT_INSTANTS: Final = 2500
 """Number of instants in the document; a run has about a hundred times as many samples."""
-_BAND_INSTANTS: Final = 600
 
 
 class _Signal(NamedTuple):
@@ -168,28 +166,3 @@ def eccentric_rows(run: EccentricRun) -> Rows:
         facts=(("amplitude (log)", amplitude_line(run.time, run.amplitude, end=float(run.time[-1]))),),
         tables=(Table(caption="Stages", heads=("stage", "from, s", "to, s", "amplitude"), rows=stages),),
     )
-
-
-def amplitude_band(runs: Iterable[RunResult], *, end: float) -> dict[str, Any]:
-    """Smallest, median and largest amplitude of runs at equally spaced times; the amplitude of a run is its
-    maximum since the time before, so that no peak is lost.
-
-    Args: `end`: last of the times, s. Returns: Plain numbers for JSON, SI; a run that ended before has its
-        last value.
-    """
-    time = np.linspace(0.0, end, _BAND_INSTANTS)
-    peaks, settled = [], 0
-    for result in runs:
-        run, settled = result.run, settled + result.settled
-        edges = np.minimum(np.searchsorted(run.time, time), run.time.size - 1)
-        since = np.concatenate([edges[:1], edges[:-1]])
-        peaks.append([run.amplitude[a : max(b, a) + 1].max() for a, b in zip(since, edges, strict=True)])
-    low, middle, high = (row.tolist() for row in np.quantile(np.array(peaks), [0.0, 0.5, 1.0], axis=0))
-    return {
-        "time_s": time.tolist(),
-        "low_m": low,
-        "middle_m": middle,
-        "high_m": high,
-        "runs": len(peaks),
-        "settled": settled,
-    }

@@ -143,7 +143,7 @@ def test_the_text_for_controllers_says_what_stands_where() -> None:
     for line in (
         "sample: number of samples taken",
         "law.torque_per_volt: B_add, N m/V",
-        "memory.friction.1.arm: friction arm mu, m",
+        "memory.friction.filter.1.arm: friction arm mu, m",
         "memory.voltage: for the motor of mass 1 and 2, held to the next sample, V",
     ):
         assert line in text

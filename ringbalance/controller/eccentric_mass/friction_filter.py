@@ -42,9 +42,15 @@ class FrictionNoise(NamedTuple):
 
 
 FRICTION_FILTER: Final = np.dtype(
-    [(name, np.float64) for name in ("rate", "arm", "rate_variance", "covariance", "arm_variance")]
+    [
+        ("rate", np.float64),  # of the mass, w, rad/s
+        ("arm", np.float64),  # friction arm mu, m
+        ("rate_variance", np.float64),  # rad^2/s^2
+        ("covariance", np.float64),  # of rate and arm, rad m/s
+        ("arm_variance", np.float64),  # m^2
+    ]
 )
-"""Estimate of one mass: rate w, rad/s, friction arm mu, m, and the covariance of both."""
+"""Estimate of one mass."""
 
 
 @in_place

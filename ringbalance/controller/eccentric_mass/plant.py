@@ -442,8 +442,8 @@ def _held_step(driven: _Driven, row: FloatArray, speed: float, step: float) -> b
     d = z - steady
     a = velocity + turning * d + half * d
     if square > half * half:
-        aside = complex(0.0, root) * d
-        pull, decay = 0.5 * square * (abs(a + aside) + abs(a - aside)) / root, math.exp(-half * step)
+        jw, decay = complex(0.0, root), math.exp(-half * step)
+        pull = 0.5 * square * (abs(a + jw * d) + abs(a - jw * d)) / root
         cosine, sine = decay * math.cos(root * step), decay * math.sin(root * step) / root
     else:
         slow, fast = root - half, -root - half

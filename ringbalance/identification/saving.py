@@ -84,7 +84,7 @@ def save_result(
     ]
     fitted = [each for each in result.parameters if each.name not in START]
     saved = _fitted_scene(scene, fitted=fitted, files=files, findings=findings, result=result)
-    return write_whole(path, file_text(saved, to=path.parent))
+    return write_whole(path, file_text(saved, to=path.parent, all_keys=True))
 
 
 def _fitted_scene(

@@ -168,17 +168,18 @@ def document_of(scene: SceneFile) -> Mapping[str, Any]:
     return _known(scene).document
 
 
-def file_text(scene: SceneFile, *, to: Path) -> bytes:
+def file_text(scene: SceneFile, *, to: Path, all_keys: bool = False) -> bytes:
     """Bytes of a scene file for a folder; the path of a mesh becomes relative to that folder.
 
-    Settings that only another control algorithm reads are left out.
+    Args: `all_keys`: True to keep settings that only another control algorithm reads.
     Raises: SceneError: a scene made without the checks of a file.
     """
     checked = _known(scene)
     document = deepcopy(dict(checked.document))
     if mesh := document.get("disc", {}).get("mesh"):
         document["disc"]["mesh"] = Path(os.path.relpath(checked.folder / mesh, to)).as_posix()
-    if isinstance(settings := checked.parts.get("controller"), ControllerSettings):
+    settings = checked.parts.get("controller")
+    if isinstance(settings, ControllerSettings) and not all_keys:
         content = document.get("controller", {})
         for key, shown in descriptions_of(ControllerSettings).items():
             if shown.only_for not in ("", settings.kind):

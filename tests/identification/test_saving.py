@@ -43,7 +43,7 @@ def fitted(path: str, value: float, width: float, **more: Any) -> FittedParamete
 
 
 def read_again(scene: AnyScene) -> AnyScene:
-    return scene_from(content=file_text(scene, to=Path.cwd()), file="a.toml")
+    return scene_from(content=file_text(scene, to=Path.cwd(), all_keys=True), file="a.toml")
 
 
 def saved(name: str, *parameters: FittedParameter) -> AnyScene:

@@ -105,3 +105,35 @@ def test_check_balancer_passes(beside: Path) -> None:
     code, text = ended(beside, "check-balancer ball")
     assert code == 0
     assert text.startswith("the balancer ball passes all 17 checks")
+
+
+@pytest.mark.parametrize(
+    ("last", "said"),
+    [
+        ("yield -count * 0.1, 0j", "correction 0j at -0.1 s, after 0.0 s"),
+        ("yield count * 0.1, complex('nan')", "correction (nan+0j) at 0.0 s"),
+    ],
+)
+def test_a_correction_that_cannot_be_is_one_sentence(tmp_path: Path, last: str, said: str) -> None:
+    install_balls(tmp_path / "site")
+    (tmp_path / "balls.toml").write_bytes(EXAMPLE)
+    (module,) = (tmp_path / "site").rglob("balancer.py")
+    text = module.read_text(encoding="utf-8")
+    head = "    def corrections("
+    begin = text.index(head)
+    signature = text[begin : text.index(":\n", text.index("->", begin)) + 2]
+    body = f"        for count in range(10**9):\n            {last}\n\n"
+    end = text.index("\n    def ", begin + 1) + 1 if "\n    def " in text[begin + 1 :] else len(text)
+    module.write_text(text[:begin] + signature + body + text[end:], encoding="utf-8")
+    child = subprocess.run(
+        [sys.executable, "-m", "ringbalance", "simulate", "balls.toml"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path / "site"), "PYTHONDONTWRITEBYTECODE": "1"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert child.returncode == 2
+    assert said in " ".join(child.stderr.split())
+    assert "Traceback" not in child.stderr

@@ -340,7 +340,13 @@ class Simulation(PresentedResult):
             return Outcome.HOVERING if state["lost"] else incomplete
         if self.refused and cause == IDLE:
             return Outcome.CHAMBER_EMPTY
-        if self.longest is not None and not self.longest.moved:
+        last_sample = self.samples[-1] if self.samples else None
+        # The time limit may have cut the last injection short.
+        cut = last_sample is not None and any(
+            last_sample.time + each.duration > self.scene.run.time_limit
+            for each in last_sample.command.valves
+        )
+        if self.longest is not None and not self.longest.moved and not cut:
             # The last injection moved nothing; gas may lack the time to fill the chamber.
             last, plant = self.longest, self.plant
             if last.event in {Event.EMPTY, Event.FULL}:

@@ -30,6 +30,7 @@ from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.draws import deviates, quantiles, run_noise
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.keys.declaration import UNCERTAIN, keys_of, needed, standard
 from ringbalance.scene.keys.fields import (
     Influence,
@@ -274,8 +275,12 @@ class StandardBalancer(Balancer):
             parts = random.standard_normal(2)
             return complex(rotor.influence * (unbalance + correction) + noise * complex(*parts))
 
-        moves = []
+        moves: list[tuple[float, complex]] = []
         for time, correction in self.corrections(device, assumed=assumed, measure=measure):
+            last = moves[-1][0] if moves else -math.inf
+            if not (time > last and cmath.isfinite(correction)):
+                problem = f"its balancer gives the correction {correction} at {time} s, after {last} s"
+                raise SceneError.of_file(assumed.file, problem, "finite corrections at times that increase")
             if time > span:
                 break
             moves.append((time, correction))

@@ -362,7 +362,9 @@ def _checked(path: str, value: Any, reader: ValueReader) -> Any:
     if not isinstance(value, str):
         return value
     read = _read(path, value, reader)
-    return read if isinstance(read, int | float | tuple) else value
+    # A tolerance reads as a number with its kind, a truth value: it stays as it was written.
+    kind = isinstance(read, tuple) and any(isinstance(each, bool) for each in read)
+    return read if isinstance(read, int | float | tuple) and not kind else value
 
 
 def _reader(scene: SceneFile, path: str) -> ValueReader:

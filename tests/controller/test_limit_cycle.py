@@ -12,7 +12,7 @@ import ringbalance as rb
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.reduced_model.calibration import calibrated_model
-from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from scenes import with_tables
@@ -22,6 +22,11 @@ from scenes import with_tables
 def machine(name: str) -> tuple[Scene, BalancerModel]:
     scene = liquid_ring_scene(rb.load_scene(name))
     return scene, calibrated_model(scene, checked=False)
+
+
+@cache
+def law() -> CompleteLaw:
+    return rb.calibrate(rb.load_scene("grinding_spindle")).flow_law
 
 
 def drawn(name: str, seed: int, *, offset: float) -> Simulation:
@@ -107,6 +112,39 @@ def test_a_strong_integral_with_a_wrong_lag_is_near_instability(ratio: float) ->
     assert finding.values["error"] == pytest.approx(math.radians(40.0))
     codes = {each.code for each in simulate(scene, model).findings}
     assert not codes & {"phase_margin_small", "gain_margin_small"}
+
+
+@pytest.mark.parametrize("error", [47.0, 53.0, 60.0])
+def test_a_lag_that_no_gain_bears_is_named(error: float) -> None:
+    """Such runs end in a limit cycle, at the time limit or by growing: the cause is one."""
+    scene, model = machine("grinding_spindle")
+    wrong = with_tables(scene, controller={"assumed_lag_angle": scene.rotor.lag_angle + math.radians(error)})
+    run, loop = simulate(wrong, model), rb.linear_loop(wrong, flow_law=law())
+    for findings in (run.findings, loop.findings):
+        (finding,) = (each for each in findings if each.code == "lag_beyond")
+        assert finding.values["error"] == pytest.approx(math.radians(error))
+    assert not run.settled
+    assert not loop.stable
+
+
+def test_a_loop_says_where_its_margins_do_not_cover_the_integral() -> None:
+    scene, _ = machine("grinding_spindle")
+    loop = rb.linear_loop(scene, flow_law=law())
+    for factor in (0.98, 1.02):
+        changed = with_tables(scene, controller={"integral_time": 5.0 * factor * loop.plant.dt})
+        codes = {each.code for each in rb.linear_loop(changed, flow_law=law()).findings}
+        assert ("integral_short" in codes) == (factor < 1.0)
+    # The bundled spindle has 2.5 s, 3.6 sampling intervals.
+    assert loop.integral == pytest.approx(0.274, abs=0.001)
+    assert "integral_short" in {each.code for each in loop.findings}
+
+
+def test_an_injection_that_the_time_limit_cuts_is_not_too_short() -> None:
+    scene, model = machine("grinding_spindle")
+    run = simulate(with_tables(scene, run={"time_limit": 0.1}), model)
+    assert run.longest is not None
+    assert not run.longest.moved
+    assert run.outcome is Outcome.TIME_LIMIT
 
 
 def test_a_gain_near_its_limit_is_near_instability() -> None:

@@ -213,3 +213,10 @@ def test_every_error_of_a_file_of_valves_names_its_cell(paper_scene: Scene, valv
         assert len(lines) == len(expected), lines
         for line, parts in zip(lines, expected, strict=True):
             assert all(part in line for part in ("valves.csv", *parts)), line
+
+
+def test_tolerances_are_swept_as_they_are_written(paper_scene: Scene) -> None:
+    """A tolerance is read with its kind, relative or not: neither is a plain number."""
+    table = rb.sweep(paper_scene, {"uncertainty.bore": "0.01 mm,2 %"}, intervals=False)
+    assert [row["status"] for row in table.static] == ["ok", "ok"]
+    assert [point["uncertainty.bore"] for point in table.points] == ["0.01 mm", "2 %"]

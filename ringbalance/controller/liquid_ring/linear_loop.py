@@ -23,7 +23,13 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.liquid_ring.loop_factor import Margins, default_gain, loop_margins, loop_rate
+from ringbalance.controller.liquid_ring.loop_factor import (
+    Margins,
+    default_gain,
+    loop_margins,
+    loop_rate,
+    small_margin,
+)
 from ringbalance.physics import balancing
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
 from ringbalance.results.rows import Finding
@@ -35,6 +41,8 @@ from ringbalance.scene.registry import registered
 
 AIR_TIME: Final = ("air_time_x", "air_time_y")
 VIBRATION: Final = ("vibration_x", "vibration_y")
+LEAST_INTEGRAL_STEPS: Final = 5.0
+"""Integral time, in sampling intervals, below which the margins may not hold, see `loop_margins`."""
 _INEXACT: Final = "integral and derivative of the matrices hold only while the residual keeps its direction"
 
 
@@ -85,7 +93,7 @@ class LinearLoop:
     derivative: float
     """q = Td/dt."""
     findings: tuple[Finding, ...]
-    """Findings on a default gain, which the scene does not state."""
+    """Findings on a default gain, on small margins and on an integral that they do not cover."""
 
     def __repr__(self) -> str:
         """Results on the loop without its matrices, for JSON."""
@@ -204,13 +212,17 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
         states=states,
         dt=dt,
     )
+    loop_gain = cmath.rect(settings.proportional * rate, settings.assumed_lag_angle - lag)
+    findings = [*default_gain(scene), *small_margin(scene, loop_margins(loop_gain, integral=integral > 0.0))]
+    if integral * LEAST_INTEGRAL_STEPS > 1.0:
+        findings.append(Finding(code="integral_short", values={"intervals": 1.0 / integral}))
     return LinearLoop(
         plant=plant,
         controller=controller,
-        gain=cmath.rect(settings.proportional * rate, settings.assumed_lag_angle - lag),
+        gain=loop_gain,
         integral=integral,
         derivative=derivative,
-        findings=tuple(default_gain(scene)),
+        findings=tuple(findings),
     )
 
 

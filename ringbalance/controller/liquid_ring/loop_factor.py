@@ -54,6 +54,8 @@ _SMALL_GAIN_MARGIN: Final = 1.1
 """Gain margin below which a loop is near instability: rotor and flow are seldom known more closely."""
 _SMALL_PHASE_MARGIN_RAD: Final = math.radians(10.0)
 """Phase margin likewise: about three times the half-width with which a lag angle is measured."""
+_WRONG_LAG_RAD: Final = math.pi / 4.0
+"""Error of the lag angle beyond which a loop with an integral part is unstable at any gain."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,14 +130,17 @@ def default_gain(scene: Scene) -> Iterator[Finding]:
 
 
 def small_margin(scene: Scene, margins: Margins | None) -> Iterator[Finding]:
-    """Finding that a stable loop is near instability."""
-    if margins is None or not margins.stable:
+    """Finding that a loop is near instability, or beyond it by the error of its lag angle."""
+    if margins is None:
         return
-    if margins.gain_factor < _SMALL_GAIN_MARGIN:
+    error = abs(math.remainder(scene.controller.assumed_lag_angle - scene.rotor.lag_angle, math.tau))
+    if not margins.stable:
+        if error >= _WRONG_LAG_RAD:
+            yield Finding(code="lag_beyond", values={"error": error})
+    elif margins.gain_factor < _SMALL_GAIN_MARGIN:
         yield Finding(code="gain_margin_small", values={"factor": margins.gain_factor})
     elif margins.phase < _SMALL_PHASE_MARGIN_RAD:
-        error = math.remainder(scene.controller.assumed_lag_angle - scene.rotor.lag_angle, math.tau)
-        yield Finding(code="phase_margin_small", values={"phase": margins.phase, "error": abs(error)})
+        yield Finding(code="phase_margin_small", values={"phase": margins.phase, "error": error})
 
 
 def vibration_left(scene: Scene, loop: LoopFactor) -> float | None:

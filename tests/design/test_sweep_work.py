@@ -56,8 +56,7 @@ def test_any_executor_gives_the_same_table(paper_scene: Scene, caplog: pytest.Lo
     for lost in (Lost(), Lost(before=True)):
         caplog.clear()
         assert rb.sweep(paper_scene, pressures, runs=2, executor=lost).to_csv() == serial
-        (note,) = caplog.messages
-        assert "its work is done again in this process" in note
+        assert sum("its work is done again in this process" in each for each in caplog.messages) == 1
 
 
 def test_kept_answers_are_found_by_content_and_damaged_ones_made_again(

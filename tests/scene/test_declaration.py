@@ -99,14 +99,14 @@ def test_a_field_that_declares_no_values_is_refused() -> None:
 def test_every_description_of_a_scene_reaches_its_table() -> None:
     """Each described field gives one row, unless it is absent or belongs to another algorithm."""
     scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
-    trial = with_tables(scene, controller={"kind": "trial"})
+    kinds = [with_tables(scene, controller={"kind": kind}) for kind in ("trial", "target_vector")]
     names = {
         entry.name
         for table in LIQUID_RING.tables.values()
         if table.record is not None
         for entry in descriptions_of(table.record).values()
     }
-    described = {row.quantity for row in scene_table(trial)}
+    described = {row.quantity for each in kinds for row in scene_table(each)}
     optional = {"critical pressure ratio b", "dead volume", "valve lag", "gas inlet radius", "mass"}
     optional |= {"measured factor on lambda", "geometry of a chamber", "runout", "phase of the runout"}
     optional |= {"leak to ambient", "leak from the supply", "relative humidity of the supply"}

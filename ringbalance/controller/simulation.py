@@ -340,11 +340,10 @@ class Simulation(PresentedResult):
             return Outcome.HOVERING if state["lost"] else incomplete
         if self.refused and cause == IDLE:
             return Outcome.CHAMBER_EMPTY
-        last_sample = self.samples[-1] if self.samples else None
-        # The time limit may have cut the last injection short.
-        cut = last_sample is not None and any(
-            last_sample.time + each.duration > self.scene.run.time_limit
-            for each in last_sample.command.valves
+        # The time limit may have cut the first injections short.
+        first = self.samples[0] if self.samples else None
+        cut = first is not None and any(
+            first.time + each.duration > self.scene.run.time_limit for each in first.command.valves
         )
         if self.longest is not None and not self.longest.moved and not cut:
             # The last injection moved nothing; gas may lack the time to fill the chamber.

@@ -99,7 +99,7 @@ def _numbers(run: Simulation) -> dict[str, Value]:
     }
     if run.longest is not None:
         numbers |= {"duration": run.longest.duration, "chamber": run.longest.chamber}
-    if run.limit_cycle:
+    if run.outcome is Outcome.LIMIT_CYCLE and run.limit_cycle:
         numbers["corrections"], numbers["cycle_amplitude"] = run.limit_cycle
     if run.outcome is Outcome.STALLED:
         numbers |= _pressures(run)
@@ -121,8 +121,8 @@ def _causes(run: Simulation) -> Iterator[Finding]:
             yield Finding(code="noise_sustained", values={"deviation": deviation})
     if outcome in {Outcome.TIME_LIMIT, Outcome.GAS_TIME_TOO_SHORT}:
         yield from _dead_time(run)
-    lag_is_off = any(small_margin(scene, loop.margins))
-    if outcome is Outcome.LIMIT_CYCLE and run.controller == "target_vector" and not lag_is_off:
+    near_instability = any(small_margin(scene, loop.margins))
+    if outcome is Outcome.LIMIT_CYCLE and run.controller == "target_vector" and not near_instability:
         yield Finding(code="cycle_ends")
     if outcome in {Outcome.DIVERGING, Outcome.UNSTABLE}:
         # A residual grows: too much of it is removed at once, or in another direction.

@@ -341,10 +341,8 @@ class Simulation(PresentedResult):
         if self.refused and cause == IDLE:
             return Outcome.CHAMBER_EMPTY
         # The time limit may have cut the first injections short.
-        first = self.samples[0] if self.samples else None
-        cut = first is not None and any(
-            first.time + each.duration > self.scene.run.time_limit for each in first.command.valves
-        )
+        first, end = self.samples[0], self.scene.run.time_limit
+        cut = any(first.time + each.duration > end for each in first.command.valves)
         if self.longest is not None and not self.longest.moved and not cut:
             # The last injection moved nothing; gas may lack the time to fill the chamber.
             last, plant = self.longest, self.plant
@@ -390,7 +388,7 @@ class Simulation(PresentedResult):
             return None
         met = np.interp(last, self.time, self.reading)
         before, after = met[:third], met[third:]
-        falls = min(after.max() / before.max(), after.mean() / before.mean()) < _FALLS
+        falls = after.max() < _FALLS * before.max() or after.mean() < _FALLS * before.mean()
         moves = np.diff([np.interp(last, self.time, fills) for fills in self.fill_ratio.values()])
         undone = np.abs(moves.sum(axis=1)).sum() < 0.5 * np.abs(moves).sum()
         return (len(last), float(met.max())) if undone and not falls else None

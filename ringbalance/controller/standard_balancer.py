@@ -28,7 +28,7 @@ from ringbalance.controller.rotor import CommonRotor, Rotors, rotor_fault
 from ringbalance.controller.trials import SearchAxis, Trials, rounded
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
-from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.arrays import ComplexArray, FloatArray, within_since
 from ringbalance.scene.draws import deviates, quantiles, run_noise
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.keys.declaration import UNCERTAIN, keys_of, needed, standard
@@ -137,9 +137,7 @@ class StandardRun:
     @property
     def settling_time(self) -> float | None:
         """Time from which on the amplitude is within the limit to the end, s; None: not settled."""
-        above = np.flatnonzero(self.amplitude > self.limit)
-        first = int(above[-1]) + 1 if above.size else 0
-        return None if first == self.time.size else float(self.time[first])
+        return within_since(self.time, self.amplitude, limit=self.limit)
 
     @property
     def settled(self) -> bool:

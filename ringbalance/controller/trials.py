@@ -34,6 +34,7 @@ class SearchAxis:
     first: tuple[int, ...]
     """Indices of the levels that are tried first; the neighbours of the best follow."""
     unit: str = "1"
+    """SI unit of the levels."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -55,6 +55,7 @@ class Range:
     count: int | None = None
     """Number of evenly spaced values; None: usable in a sample only."""
     log: bool = False
+    """True if the steps are even in the logarithm."""
 
     def at(self, share: FloatArray) -> FloatArray:
         """Values at fractions of the range, in [0, 1]; exact at both ends."""

@@ -46,3 +46,10 @@ def plain(values: npt.ArrayLike) -> Any:
 def finite(value: float | None) -> float | None:
     """A finite number, else None: JSON has no infinity and no NaN."""
     return value if value is not None and math.isfinite(value) else None
+
+
+def within_since(time: FloatArray, values: FloatArray, *, limit: float) -> float | None:
+    """Time from which on values stay within a limit to the end; None: the last one exceeds it."""
+    above = np.flatnonzero(values > limit)
+    first = int(above[-1]) + 1 if above.size else 0
+    return None if first == time.size else float(time[first])

@@ -114,6 +114,21 @@ def test_a_strong_integral_with_a_wrong_lag_is_near_instability(ratio: float) ->
     assert not codes & {"phase_margin_small", "gain_margin_small"}
 
 
+def test_corrections_of_noise_that_move_nothing_are_none() -> None:
+    """A balanced rotor without gas: every reading is zero, and noise alone asks for corrections."""
+    scene, model = machine("liquid_ring_paper")
+    still = with_tables(
+        scene,
+        rotor={"initial_amplitude": 0.0},
+        sensor={"amplitude_noise": 1e-6},
+        gas={"pressure": 0.0},
+        run={"time_limit": 40.0},
+    )
+    run = simulate(still, model, modelled=[])
+    assert sum(bool(sample.command.valves) for sample in run.samples) >= 9
+    assert run.limit_cycle is None
+
+
 @pytest.mark.parametrize("error", [47.0, 53.0, 60.0])
 def test_a_lag_that_no_gain_bears_is_named(error: float) -> None:
     """Such runs end in a limit cycle, at the time limit or by growing: the cause is one."""

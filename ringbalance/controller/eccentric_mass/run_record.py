@@ -21,7 +21,7 @@ from ringbalance.controller.eccentric_mass.supervisor import STALLED_SHARE
 from ringbalance.controller.eccentric_mass.targets import Targets, target_angles
 from ringbalance.results.result import PresentedResult
 from ringbalance.results.rows import Finding, Value, sentences
-from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Records
+from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Records, within_since
 from ringbalance.scene.uncertain import NORMAL_95
 
 _ROUNDING_FRACTION: Final = 1e-6
@@ -161,9 +161,7 @@ class EccentricRun(PresentedResult):
     @cached_property
     def within_since(self) -> float | None:
         """Time of the sample from which on the amplitude stays within the limit, s; None if it ends above."""
-        above = np.flatnonzero(self.amplitude > self.limit)
-        first = int(above[-1]) + 1 if above.size else 0
-        return None if first == self.time.size else float(self.time[first])
+        return within_since(self.time, self.amplitude, limit=self.limit)
 
     @cached_property
     def outcome(self) -> EccentricOutcome:

@@ -17,7 +17,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -41,7 +41,7 @@ from ringbalance.scene.registry import registered
 
 AIR_TIME: Final = ("air_time_x", "air_time_y")
 VIBRATION: Final = ("vibration_x", "vibration_y")
-LEAST_INTEGRAL_STEPS: Final = 5.0
+_LEAST_INTEGRAL_STEPS: Final = 5.0
 """Integral time, in sampling intervals, below which the margins may not hold, see `loop_margins`."""
 _INEXACT: Final = "integral and derivative of the matrices hold only while the residual keeps its direction"
 
@@ -212,18 +212,18 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
         states=states,
         dt=dt,
     )
-    loop_gain = cmath.rect(settings.proportional * rate, settings.assumed_lag_angle - lag)
-    findings = [*default_gain(scene), *small_margin(scene, loop_margins(loop_gain, integral=integral > 0.0))]
-    if integral * LEAST_INTEGRAL_STEPS > 1.0:
-        findings.append(Finding(code="integral_short", values={"intervals": 1.0 / integral}))
-    return LinearLoop(
+    loop = LinearLoop(
         plant=plant,
         controller=controller,
-        gain=loop_gain,
+        gain=cmath.rect(settings.proportional * rate, settings.assumed_lag_angle - lag),
         integral=integral,
         derivative=derivative,
-        findings=tuple(findings),
+        findings=(),
     )
+    findings = [*default_gain(scene), *small_margin(scene, loop.margins)]
+    if integral * _LEAST_INTEGRAL_STEPS > 1.0:
+        findings.append(Finding(code="integral_short", values={"intervals": 1.0 / integral}))
+    return replace(loop, findings=tuple(findings))
 
 
 def _matrix(rows: Sequence[Sequence[complex]]) -> FloatArray:

@@ -54,8 +54,8 @@ _SMALL_GAIN_MARGIN: Final = 1.1
 """Gain margin below which a loop is near instability: rotor and flow are seldom known more closely."""
 _SMALL_PHASE_MARGIN_RAD: Final = math.radians(10.0)
 """Phase margin likewise: about three times the half-width with which a lag angle is measured."""
-_WRONG_LAG_RAD: Final = math.pi / 4.0
-"""Error of the lag angle beyond which a loop with an integral part is unstable at any gain."""
+_INTEGRAL_LAG_RAD: Final = math.pi / 4.0
+"""Error of the lag angle from which on a loop with an integral part is unstable at any gain."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,7 +135,7 @@ def small_margin(scene: Scene, margins: Margins | None) -> Iterator[Finding]:
         return
     error = abs(math.remainder(scene.controller.assumed_lag_angle - scene.rotor.lag_angle, math.tau))
     if not margins.stable:
-        if error >= _WRONG_LAG_RAD:
+        if error >= _INTEGRAL_LAG_RAD:
             yield Finding(code="lag_beyond", values={"error": error})
     elif margins.gain_factor < _SMALL_GAIN_MARGIN:
         yield Finding(code="gain_margin_small", values={"factor": margins.gain_factor})
@@ -290,7 +290,7 @@ def loop_margins(gain: complex, *, integral: bool = False) -> Margins:
     h, error = abs(gain), abs(cmath.phase(gain))
     most = math.acos(min(h / 2.0, 1.0))
     if integral:
-        most = min(most, math.pi / 4.0)
+        most = min(most, _INTEGRAL_LAG_RAD)
     phase = max(most - error, 0.0)
     disk, peak = 0.0, math.inf
     if phase > 0.0:
@@ -299,7 +299,7 @@ def loop_margins(gain: complex, *, integral: bool = False) -> Margins:
         centre, radius = _image(1.0, 1.0 - gain)
         peak = abs(centre) + radius
     return Margins(
-        gain_factor=0.0 if integral and error >= math.pi / 4.0 else max(2.0 * math.cos(error), 0.0) / h,
+        gain_factor=0.0 if integral and error >= _INTEGRAL_LAG_RAD else max(2.0 * math.cos(error), 0.0) / h,
         phase=phase,
         disk=disk,
         disk_gain_factor=math.inf if disk >= 2.0 else (2.0 + disk) / (2.0 - disk),

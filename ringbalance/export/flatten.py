@@ -343,9 +343,7 @@ class _FunctionWriter:
                 self.out += self._block(body)
 
     def _return(self, node: ast.expr | None) -> None:
-        value = None if node is None else self._value(node)
-        if isinstance(value, _RowPart):
-            value = _Compound(tuple(self._unpacked(value)))
+        value = None if node is None else self._copied(self._value(node))
         if self.result is None and value is not None:
             self.result = value
             if isinstance(value, _Compound):
@@ -536,6 +534,13 @@ class _FunctionWriter:
             self._read(_RowPart(value.row, part, _sum(value.at, str(layout.start(i)))))
             for i, part in enumerate(layout.parts)
         ]
+
+    def _copied(self, value: Any) -> Any:
+        """A value with the numbers of parts of rows in place of their places, which a function may change."""
+        if isinstance(value, _Scalar):
+            return value
+        names = value.names if isinstance(value, _Compound) else value.layout.names
+        return _Compound(tuple(map(self._copied, self._unpacked(value))), names)
 
     def _complex(self, value: Any) -> Any:
         if isinstance(value, _Scalar):

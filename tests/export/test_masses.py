@@ -8,7 +8,7 @@ import subprocess
 from functools import cache
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, NamedTuple, cast
 from zipfile import ZipFile
 
 import numpy as np
@@ -166,6 +166,38 @@ def _set_all(settings: Any, host: Any, time: float) -> None:
         _set_leaf(host.pair[i].leaf, settings[0] * time * (1 + i))
     _set_leaf(host.leaf, 1j)
     host.first = host.pair[1].leaf.vector.imag
+
+
+class _Found(NamedTuple):
+    number: float
+    leaf: Any
+
+
+def _found(host: Any, index: int) -> _Found:
+    place = index + 1
+    return _Found(host.first, host.pair[place - 1].leaf)
+
+
+def _leaf(host: Any, index: int) -> Any:
+    return host.pair[index].leaf
+
+
+def _move_leaf(settings: Any, host: Any, time: float) -> None:
+    for i in range(2):
+        found = _found(host, 1 - i)
+        host.first = found.number + found.leaf.vector.real
+        host.leaf.vector = found.leaf.vector + settings[0] * time
+        host.pair[i].leaf.held = _leaf(host, 1 - i).held + 1
+
+
+def test_a_record_that_a_function_returns_keeps_its_numbers() -> None:
+    flat, row = Flattening.of(_move_leaf, (2j,), np.zeros(1, dtype=_NESTED)[0]), [0.0] * 10
+    names: dict[str, Any] = {"Law": list, "Query": list}
+    exec(python_functions(flat.source), names)
+    row[1:7] = [5.0, 3.0, 4.0, 7.0, 1.0, 2.0]
+    row += [0.0] * (flat.row - len(row))
+    names["do_move_leaf"]([0.0, 2.0], row, 1.0)
+    assert row[:10] == [4.0, 8.0, 3.0, 4.0, 9.0, 1.0, 2.0, 0.0, 3.0, 6.0]
 
 
 def test_records_within_records_are_places_of_any_depth() -> None:

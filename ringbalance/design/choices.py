@@ -23,7 +23,7 @@ from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 from ringbalance.scene.platform.display import LOG
 from ringbalance.scene.units import FieldError
-from ringbalance.scene.valves import FLOWS, Valve, taken_ratio
+from ringbalance.scene.valves import FLOWS, Valve, assumed_lag, taken_ratio
 
 NAME: Final = "name"
 """Column with the names of rows, unless the scene's table has a key of this name."""
@@ -103,7 +103,10 @@ def with_valves(scene: AnyScene, file: Path) -> AnyScene:
 
     Raises: SceneError: every error of the file; or a scene without a liquid ring.
     """
-    return with_choices(liquid_ring_scene(scene), file, Valve, among="design.valves", table="gas")
+    changed = with_choices(liquid_ring_scene(scene), file, Valve, among="design.valves", table="gas")
+    if slow := [each for each in liquid_ring_scene(changed).design.valves if each.assumes_lag]:
+        LOG.warning("%s: %s", file_name(file), assumed_lag(slow))
+    return changed
 
 
 def with_choices(scene: AnyScene, file: Path, kind: type, *, among: str, table: str = "") -> AnyScene:

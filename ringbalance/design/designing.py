@@ -26,7 +26,7 @@ from ringbalance.design.closing import AS_SMALL, enlarged, growth, judged_design
 from ringbalance.design.hunt import Static, hunt
 from ringbalance.design.races import RacedDesign, Races, deal
 from ringbalance.design.racing import DEVICES, devices_row, judged_design
-from ringbalance.design.space import Space
+from ringbalance.design.space import OF_SCENE, VALVE, Space
 from ringbalance.design.static import row_reach, static_rows
 from ringbalance.results.requirements import MET, Paired, Proportion
 from ringbalance.results.result import Presentation, PresentedResult
@@ -99,8 +99,6 @@ class Design(PresentedResult):
     unchanged: tuple[Judgement, float | None] | None = None
     """Judgement of the scene's own disc and settings, and the unbalance that it cancels, kg m; None: the size
     varies."""
-    assumed: tuple[str, ...] = ()
-    """Paths of `point` whose values the program assumes, such as the lag of a valve on sale."""
     endurance: Endurance | None
     """Devices over the hours of holding; None: the loss of liquid is not known, or not required."""
 
@@ -113,6 +111,14 @@ class Design(PresentedResult):
     def size(self) -> float:
         """Volume of the cylinder around its chambers, m^3."""
         return self.space.size(self.point)
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """Paths of `point` whose values the program assumes: the lag of a valve that states none."""
+        name = self.space.names(self.point).get(VALVE)
+        at_hand = (each.assumes_lag for each in self.space.scene.design.valves if each.name == name)
+        of_scene = name == OF_SCENE and self.given.origin_of("gas.valve_lag") == "assumed"
+        return ("gas.valve_lag",) if any(at_hand) or of_scene else ()
 
     @property
     def recommended_scene(self) -> SceneFile:

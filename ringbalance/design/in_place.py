@@ -5,13 +5,13 @@ from __future__ import annotations
 import contextlib
 import math
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.judging.judge import judged_all, plain_settings
 from ringbalance.controller.liquid_ring.offers import valves_on_sale
 from ringbalance.design.designing import Design
-from ringbalance.design.space import VALVE, VALVE_KEYS
+from ringbalance.design.space import OF_SCENE, VALVE, VALVE_KEYS
 from ringbalance.design.static import row_reach, static_rows
 from ringbalance.design.store import Store, key_of
 from ringbalance.reduced_model.residual_liquid import Holding
@@ -19,12 +19,9 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.platform.kept_code import code_root, trusted
 
-OF_SCENE: Final = "as in the scene"
-"""Name of the scene's valve among those on sale."""
-
 
 def opens_valve(scene: Scene) -> bool:
-    """True if no table [design] states valves, so that valves on sale, with assumed lags, may be tried."""
+    """True if no table [design] states valves, so that valves on sale may be tried."""
     return not scene.design.valves and scene.design.valve_file is None
 
 
@@ -32,9 +29,7 @@ def beside_unchanged(scene: Scene, design: Design) -> Design:
     """The design of the scene before `within_disc`, with the judgement of its own disc and settings."""
     (unchanged,) = judged_all(balancer_of(scene), [{}])
     reach = row_reach(static_rows(scene, [{}], intervals=False)[0])
-    valve = design.space.names(design.point).get(VALVE, OF_SCENE)
-    assumed = ("gas.valve_lag",) if opens_valve(scene) and valve != OF_SCENE else ()
-    return replace(design, given=scene, unchanged=(unchanged, reach), assumed=assumed)
+    return replace(design, given=scene, unchanged=(unchanged, reach))
 
 
 def within_disc(scene: Scene, *, other_valves: bool = False) -> Scene:

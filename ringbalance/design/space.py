@@ -10,12 +10,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.design.axes import Point, Range, SweepAxis, plan_of, plan_of_texts
+from ringbalance.design.axes import Point, Range, SweepAxis, plan_of_texts
+from ringbalance.design.choices import with_valves
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import COMMAND_LINE, Fault, SceneError
 from ringbalance.scene.keys.derivations import shortest_path
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.toml import toml_text
 
@@ -30,6 +32,8 @@ _HASTY_FACTOR: Final = 2.0
 VALVE: Final = "valve"
 LIQUID: Final = "liquid"
 """Names of all keys of a valve or a liquid together."""
+OF_SCENE: Final = "as in the scene"
+"""Name of the scene's valve among those on sale."""
 VALVE_KEYS: Final = ("conductance", "critical_ratio", "valve_lag")
 _VALVE: Final = tuple(f"gas.{key}" for key in VALVE_KEYS)
 _LIQUID_KEYS: Final = ("name", "density", "kinematic_viscosity", "vapour_pressure", "temperature")
@@ -46,6 +50,8 @@ class Space:
     @classmethod
     def of(cls, scene: Scene) -> Space:
         """Make the space of [design]. Raises: SceneError: nothing may vary, or a key cannot be used."""
+        if scene.design.valve_file is not None:
+            scene = _with_valve_file(scene, scene.design.valve_file)
         keys = scene.design
         axes = [*_listed(scene), *_valves(scene), *_liquids(scene)]
         taken = {path for axis in axes for path in axis.paths}
@@ -203,22 +209,36 @@ def _listed(scene: Scene) -> tuple[SweepAxis, ...]:
     try:
         return plan_of_texts(scene, scene.design.vary, folder=folder).axes
     except SceneError as error:
-        raise SceneError([_placed(scene, "vary", each) for each in error.faults]) from error
+        # Errors within a file of an axis are unchanged.
+        raise SceneError(
+            replace(each, file=scene.file, table="design", key="vary") if each.file == COMMAND_LINE else each
+            for each in error.faults
+        ) from error
+
+
+def _with_valve_file(scene: Scene, file: str) -> Scene:
+    """The scene with the valves of its file in place of their list."""
+    folder = scene.checked.folder if scene.checked is not None else Path()
+    if not (folder / file).is_file():
+        fault = Fault(
+            file=scene.file,
+            table="design",
+            key="valve_file",
+            value=toml_text(file),
+            problem="there is no such file",
+            allowed="a CSV file beside the scene",
+        )
+        raise SceneError([fault])
+    return liquid_ring_scene(with_valves(scene, folder / file))
 
 
 def _valves(scene: Scene) -> tuple[SweepAxis, ...]:
     """One axis with all available valves; empty if there are none."""
     keys = scene.design
-    if keys.valve_file is not None:
-        folder = scene.checked.folder if scene.checked is not None else Path()
-        try:
-            return plan_of(scene, {"gas": folder / keys.valve_file}).axes
-        except SceneError as error:
-            raise SceneError([_placed(scene, "valve_file", each) for each in error.faults]) from error
     if not keys.valves:
         return ()
     choices = tuple(
-        dict(zip(_VALVE, (*valve.iso_6358, valve.valve_lag), strict=True))
+        dict(zip(_VALVE, (*valve.iso_6358, valve.lag), strict=True))
         for valve in (each.completed for each in keys.valves)
     )
     return (SweepAxis(ranges={}, choices=choices, names=tuple(valve.name for valve in keys.valves)),)
@@ -247,14 +267,6 @@ def _liquids(scene: Scene) -> tuple[SweepAxis, ...]:
             ]
             raise SceneError(faults) from error
     return (SweepAxis(ranges={}, choices=tuple(choices), names=tuple(each.name for each in liquids)),)
-
-
-def _placed(scene: Scene, key: str, fault: Fault) -> Fault:
-    """Attribute an error of an axis to its key of the scene; errors within a file of valves are unchanged."""
-    if fault.file != COMMAND_LINE:
-        return fault
-    value = toml_text(scene.design.valve_file) if key == "valve_file" else fault.value
-    return replace(fault, file=scene.file, table="design", key=key, value=value)
 
 
 def _ranges(scene: Scene) -> dict[str, tuple[float, float, bool]]:

@@ -105,7 +105,8 @@ def _changed_document(
             if valve is not None and (key == "critical_ratio" or getattr(valve, key) is not None):
                 _place(document, f"gas.{key}", None, schema=schema, origin=origin)
             elif left and (number := raw_value_at(scene, f"gas.{key}")) is not None:
-                _place(document, f"gas.{key}", number, schema=schema, origin=origin)
+                stays = scene.origin_of(f"gas.{key}") == "assumed"
+                _place(document, f"gas.{key}", number, schema=schema, origin="assumed" if stays else origin)
         for other in sorted(flows - {path}):
             _place(document, other, None, schema=schema, origin=origin)
     return document

@@ -71,7 +71,7 @@ class DesignSettings:
         OneLine | None,
         unused(
             "those of `valves`",
-            "a CSV file with name and further keys of [gas] in its columns, beside the scene",
+            "a CSV file beside the scene with the keys of `valves` in its columns",
         ),
         Shown("file of valves"),
     ] = None

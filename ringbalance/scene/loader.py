@@ -123,6 +123,7 @@ def scene_of(
         stated = reading.values.get(f"{name}.{ORIGIN}", {})
         for key in (key for key in table.keys if key != ORIGIN):
             absent: ShownOrigin = "derived" if (path := f"{name}.{key}") in following else "default"
+            absent = "assumed" if path in reading.assumed else absent
             origins.append((path, stated.get(key, "given") if reading.given(path) else absent))
     parts: dict[str, Any] = {
         **_records(reading, before),

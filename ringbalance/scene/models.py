@@ -58,7 +58,7 @@ from ringbalance.scene.loop_models import (
     required_amplitude,
 )
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.valves import taken_ratio
+from ringbalance.scene.valves import assumed_lag, taken_ratio
 
 HumpGas = Literal["vented", "trapped"]
 HumpShape = Literal["arc", "point"]
@@ -459,7 +459,10 @@ class Gas:
     ]
     valve_lag: Annotated[
         Time | None,
-        unused("the valves open and close at once", "time from the command to the valve's motion"),
+        unused(
+            "that of the named valve, else 20 ms, assumed, with a stated flow; without one at once",
+            "time from the command to the valve's motion",
+        ),
         UNCERTAIN,
         Shown("valve lag", "ms"),
     ]
@@ -525,6 +528,8 @@ class Scene(SceneFile):
         taken = [each.name for each in self.design.valves if each.completed.critical_ratio is None]
         texts = [f"[gas] {self.gas.valve_source}"] if self.gas.valve_source else []
         texts += [f"[design] valves: {taken_ratio(taken)}"] if taken else []
+        slow = [each for each in self.design.valves if each.assumes_lag]
+        texts += [f"[design] valves: {assumed_lag(slow)}"] if slow else []
         return "; ".join(texts)
 
     @property

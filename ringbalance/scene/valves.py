@@ -17,6 +17,12 @@ USUAL_CRITICAL_RATIO: Final = 0.3
 """Critical pressure ratio b of a valve whose data sheet prints none; the catalogue has 0.2 to 0.4."""
 FLOWS: Final = ("conductance", "nominal_flow", "Kv", "Cv")
 """Keys of which each states the flow of a valve."""
+USUAL_LAG_S: Final = 20e-3
+"""Lag of a valve for which neither its user nor the catalogue states one: that of a piloted valve."""
+_FASTER_LAGS_S: Final[Mapping[str, float]] = MappingProxyType(
+    {"Festo MHA2-MS1H-3/2": 2e-3, "SMC SY3000": 12e-3}
+)
+"""Lags assumed of valves of the catalogue that are known as faster."""
 _NOMINAL_PRESSURES_PA: Final = (7e5, 6e5)
 """Absolute pressures before and behind a valve of its nominal flow, 6 and 5 bar gauge."""
 _NORMAL_TO_ANR: Final = 101.325 / 100 * 293.15 / 273.15
@@ -45,7 +51,7 @@ class Valve:
     ] = None
     valve_lag: Annotated[
         Time | None,
-        unused("that of the catalogue; one of both is needed", "time from the command to the valve's motion"),
+        unused("that of the catalogue, else assumed: 20 ms", "time from the command to the valve's motion"),
     ] = None
     lowest_pressure: float | None = None
     """Lowest gauge pressure that it takes, Pa."""
@@ -75,6 +81,18 @@ class Valve:
         ratio = USUAL_CRITICAL_RATIO if self.critical_ratio is None else self.critical_ratio
         return sonic_conductance(key, getattr(self, key), critical_ratio=ratio), ratio
 
+    @property
+    def lag(self) -> float:
+        """Its lag, s, or the one assumed of it where neither it nor the catalogue states one."""
+        listed, stated = find_valve(self.name), self.completed.valve_lag
+        assumed = _FASTER_LAGS_S.get(listed.name, USUAL_LAG_S) if listed else USUAL_LAG_S
+        return assumed if stated is None else stated
+
+    @property
+    def assumes_lag(self) -> bool:
+        """True if neither it nor the catalogue states its lag."""
+        return self.completed.valve_lag is None
+
 
 @cache
 def known_valves() -> Mapping[str, Valve]:
@@ -98,6 +116,12 @@ def find_valve(name: str) -> Valve | None:
 def taken_ratio(names: Iterable[str]) -> str:
     """Sentence about valves whose critical ratio is the usual one."""
     return f"b = {USUAL_CRITICAL_RATIO} of {', '.join(names)}, as no critical ratio is stated"
+
+
+def assumed_lag(valves: Iterable[Valve]) -> str:
+    """Sentence about valves whose lag is assumed."""
+    lags = ", ".join(f"{1e3 * each.lag:g} ms of {each.name}" for each in valves)
+    return f"a lag is assumed, as none is stated, {lags}: ask the seller"
 
 
 def _plain(name: str) -> str:

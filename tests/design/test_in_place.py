@@ -12,7 +12,7 @@ import ringbalance as rb
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.judging.judge import judged_all
 from ringbalance.design.designing import Design, Effect
-from ringbalance.design.in_place import beside_unchanged, kept_design, within_disc
+from ringbalance.design.in_place import kept_design, within_disc
 from ringbalance.design.space import Space
 from ringbalance.reduced_model.residual_liquid import Holding
 from ringbalance.results.requirements import MET, Proportion
@@ -112,9 +112,12 @@ def test_the_answer_is_kept_for_the_values_of_the_scene(
     weak = replace(design, effects=(few, many))
     (finding,) = (each for each in weak.rows().findings if each.code == "design_pressure")
     assert "not at 0.3 MPa: there, all else as it is, 36.7 % of 256 devices" in finding.text
-    # The lag of a valve on sale is marked in the saved scene, that of a stated one is not.
+    # A lag that is assumed is marked in the saved scene, a stated one is not.
     assert design.assumed == ()
-    on_sale = beside_unchanged(liquid_ring_scene(scene.with_values({"design.valves": None})), design)
+    unstated = scene.with_values(
+        {"design.valves": [{key: each for key, each in sound.items() if key != "valve_lag"}]}
+    )
+    on_sale = replace(design, space=replace(design.space, scene=liquid_ring_scene(unstated)))
     assert on_sale.recommended_scene.origin_of("gas.valve_lag") == "assumed"
     assert on_sale.recommended_scene.origin_of("gas.conductance") == "given"
     (finding,) = (each for each in on_sale.rows().findings if each.code == "design_lag")

@@ -13,6 +13,7 @@ from ringbalance.controller.liquid_ring.offers import valves_of
 from ringbalance.design.choices import with_valves
 from ringbalance.design.space import Space
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 
 FILE = """# from the data sheets
 name;conductance [l/(s*bar)];nominal_flow;kv;critical_ratio;valve_lag
@@ -49,11 +50,15 @@ def test_a_file_of_valves_is_tried_whatever_states_their_flow(
 
 
 def test_a_design_chooses_from_the_same_valves(file: Path) -> None:
-    scene = with_valves(rb.load_scene(rb.bundled_scene("spindle_design")), file)
-    assert isinstance(scene, Scene)
-    (axis,) = (each for each in Space.of(scene).axes if "gas.conductance" in each.paths)
-    assert axis.names == ("A", "B", "CKD M4GA2 R", "D")
-    assert [choice["gas.critical_ratio"] for choice in axis.choices] == [0.25, 0.3, 0.36, 0.5]
+    """Whether the option or the scene names the file, and with the lag that is assumed of a valve."""
+    file.write_text(FILE.replace("20 ms", ""), encoding="utf-8")
+    spindle = rb.load_scene(rb.bundled_scene("spindle_design"))
+    named = spindle.with_values({"design.valves": None, "design.valve_file": str(file)})
+    for scene in map(liquid_ring_scene, (with_valves(spindle, file), named)):
+        (axis,) = (each for each in Space.of(scene).axes if "gas.conductance" in each.paths)
+        assert axis.names == ("A", "B", "CKD M4GA2 R", "D")
+        assert [choice["gas.critical_ratio"] for choice in axis.choices] == [0.25, 0.3, 0.36, 0.5]
+        assert [choice["gas.valve_lag"] for choice in axis.choices] == [2e-3, 5e-3, 20e-3, 10e-3]
 
 
 def test_without_a_file_the_same_three_valves_as_ever_are_tried() -> None:
@@ -67,11 +72,20 @@ def test_without_a_file_the_same_three_valves_as_ever_are_tried() -> None:
     ]
 
 
-def test_only_a_lag_of_the_programs_own_counts_as_assumed(file: Path) -> None:
-    """Neither that of a file of valves nor that of the scene."""
+def test_only_a_lag_of_the_programs_own_counts_as_assumed(
+    file: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Neither a lag that a file of valves states nor that of the scene."""
     scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
     assert isinstance(scene, Scene)
     assert {each.assumed for each in valves_of(scene)} == {("gas.valve_lag",)}
+    file.write_text(FILE.replace("20 ms", ""), encoding="utf-8")
+    with caplog.at_level(logging.WARNING, logger="ringbalance"):
+        tried = valves_of(liquid_ring_scene(with_valves(scene, file)))
+    assert [each.assumed for each in tried] == [(), (), ("gas.valve_lag",), ()]
+    assert tried[2].changes["gas.valve_lag"] == 20e-3
+    assert "a lag is assumed, as none is stated, 20 ms of CKD M4GA2 R: ask the seller" in caplog.messages[-1]
+    file.write_text(FILE, encoding="utf-8")
     for stated in (with_valves(scene, file), scene.with_values({"gas.valve_lag": "15 ms"})):
         assert isinstance(stated, Scene)
         assert {each.assumed for each in valves_of(stated)} == {()}
@@ -92,7 +106,6 @@ def test_the_commands_that_try_valves_take_a_file() -> None:
         ("0.4;;;", "0.4 mm;;;", r'column "conductance \[l/\(s\*bar\)\]" = "0.4 mm"'),
         ("valve_lag", "lag", r"no such key"),
         ("B;;180 l/min;;;5 ms", "B;;;;;5 ms", r"valves\[2\]: no flow is stated"),
-        ("B;;180 l/min;;;5 ms", "B;;180 l/min;;;", r"valves\[2\].valve_lag is missing"),
     ],
 )
 def test_errors_of_a_file_of_valves_are_named(file: Path, before: str, after: str, says: str) -> None:

@@ -11,6 +11,7 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.physics.gas import flow_shape
+from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
 from ringbalance.scene.valves import USUAL_CRITICAL_RATIO, find_valve, known_valves, sonic_conductance
@@ -123,7 +124,25 @@ def test_a_pressure_that_the_valve_is_not_made_for_is_said() -> None:
         of_paper(valve="Festo MHA2-MS1H-3/2", pressure="9 bar").remark
     )
     assert "made for" not in of_paper(valve="Festo MHA2-MS1H-3/2", pressure="8 bar").remark
-    assert "no lag is printed there" in of_paper(valve="Festo MHA2-MS1H-3/2").remark
+
+
+def test_a_lag_that_is_not_stated_is_assumed_and_said() -> None:
+    """One rule for each valve, whatever states its flow; a stated lag of 0 is a stated one."""
+    flow = {"conductance": "1 l/(s*bar)", "critical_ratio": 0.3}
+    stated = ({"valve": "CKD M4GA2 R"}, flow, {"nominal_flow": "180 l/min"}, {"Kv": 0.2}, {"Cv": 0.2})
+    for keys, lag in (*((each, 20) for each in stated), ({"valve": "SMC SY3000"}, 12)):
+        scene = of_paper(**keys)
+        assert scene.gas.valve_lag == pytest.approx(1e-3 * lag)
+        assert scene.origin_of("gas.valve_lag") == "assumed"
+        assert f"a valve_lag of {lag} ms is assumed, as none is stated" in scene.remark
+        assert len(line_ends(scene)) == 1
+    assert of_paper().gas.valve_lag is None
+    for keys in ({**flow, "valve_lag": "0 ms"}, {"valve": "SMC SX3000", "critical_ratio": 0.3}):
+        assert "assumed" not in of_paper(**keys).remark
+    kept = of_paper(valve="SMC SY3000").with_values({"gas.conductance": 2e-9})
+    assert (kept.gas.valve_lag, kept.origin_of("gas.valve_lag")) == (12e-3, "assumed")
+    with pytest.raises(rb.SceneError, match=r"a valve_lag that .* is assumed"):
+        of_paper(**flow).with_values({"controller.period": "15 ms"})
 
 
 def test_a_flow_replaces_what_stated_it_before() -> None:
@@ -152,7 +171,7 @@ def test_every_command_says_the_conversion_where_it_reads_the_scene(
     rb.load_scene(file)
     assert said.messages == [
         f'{file}: [gas] nominal_flow = "180 l/min" is C = 0.708 l/(s*bar) with b = 0.3 (ISO 6358), as no '
-        "critical ratio is stated"
+        "critical ratio is stated; a valve_lag of 20 ms is assumed, as none is stated: ask the seller"
     ]
     rb.load_scene(rb.bundled_scene("grinding_spindle"))
     assert len(said.messages) == 1

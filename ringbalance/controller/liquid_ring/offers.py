@@ -136,10 +136,8 @@ _LARGER_HOLES: Final = (1.5, 2.0, 3.0)
 _LIMITS: Final = (2.0, 4.0, 6.0)
 _CRESTS: Final = (1.0, 0.96, 0.92)
 """Factors on the largest radius of a crest that holds the liquid."""
-_SOLD: Mapping[str, float] = MappingProxyType(
-    {"Festo MHA2-MS1H-3/2": 2e-3, "SMC SY3000": 12e-3, "CKD M4GA2 R": 20e-3}
-)
-"""Valves of the catalogue to try, and their lags, s, which are assumed: their sources print none."""
+_SOLD: Final = ("Festo MHA2-MS1H-3/2", "SMC SY3000", "CKD M4GA2 R")
+"""Valves of the catalogue to try; their lags are assumed, as their sources print none."""
 _MEASURED: Mapping[str, str] = MappingProxyType(
     dict.fromkeys((LOSS, *MODEL_ERRORS), "measure_flow")
     | {MOMENT: "measure_moment", "draw_down_factor": "measure_residual"}
@@ -194,10 +192,7 @@ def remedies_of(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
 def valves_on_sale() -> tuple[Valve, ...]:
     """Some valves of the catalogue, with assumed lags."""
     catalogue = known_valves()
-    return tuple(
-        Valve(name=name, conductance=rounded(catalogue[name].iso_6358[0], 2), valve_lag=lag)
-        for name, lag in _SOLD.items()
-    )
+    return tuple(Valve(name=name, conductance=rounded(catalogue[name].iso_6358[0], 2)) for name in _SOLD)
 
 
 def valves_of(scene: Scene) -> tuple[Remedy, ...]:
@@ -208,14 +203,14 @@ def valves_of(scene: Scene) -> tuple[Remedy, ...]:
 def valve_choices(scene: Scene, *, lag: float | None = None) -> tuple[Remedy, ...]:
     """Valves at hand, or some that can be bought. Args: `lag`: in place of their own, s; None: their own."""
     remedies = []
-    assumed = ("gas.valve_lag",) if lag is None and not scene.design.valves else ()
     for valve in (each.completed for each in scene.design.valves or valves_on_sale()):
         conductance, ratio = valve.iso_6358
         changes = {
             "gas.conductance": conductance,
             "gas.critical_ratio": ratio,
-            "gas.valve_lag": valve.valve_lag if lag is None else lag,
+            "gas.valve_lag": valve.lag if lag is None else lag,
         }
+        assumed = ("gas.valve_lag",) if lag is None and valve.assumes_lag else ()
         remedies.append(Remedy(code="valve", name=valve.name, changes=changes, assumed=assumed))
     return tuple(remedies)
 

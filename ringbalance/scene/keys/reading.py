@@ -81,6 +81,7 @@ class SceneReading:
     derived: frozenset[str] = frozenset()
     """Paths of values from another file, such as a mesh, that this one names."""
     converted: frozenset[str] = frozenset()
+    assumed: frozenset[str] = frozenset()
     """Paths of values that follow from another key, such as a valve's name."""
     tables: Mapping[str, TableRead] = field(default_factory=dict)
     """Tables of the document, by name."""
@@ -96,6 +97,10 @@ class SceneReading:
     def converting(self, values: Mapping[str, Any]) -> SceneReading:
         """Copy with more values that follow from other keys of the file."""
         return replace(self.adding(values), converted=self.converted | frozenset(values))
+
+    def assuming(self, values: Mapping[str, Any]) -> SceneReading:
+        """Copy with more values that are chosen, as nothing is known of them."""
+        return replace(self.adding(values), assumed=self.assumed | frozenset(values))
 
     def given(self, path: str) -> bool:
         """True when the file itself has a value at a path, readable or not."""

@@ -35,29 +35,30 @@ def with_valve(reading: SceneReading) -> tuple[SceneReading, tuple[Fault, ...]]:
         problem = f"the catalogue has no valve of that name{did_you_mean(value, known_valves())}"
         allowed = f"{', '.join(known_valves())}; or one of {', '.join(FLOWS)}"
         return reading, (reading.fault("gas.valve", problem=problem, allowed=allowed), *at_hand)
-    if key == "conductance" and ratio_stated is not None:
-        return reading, at_hand
-
     valve = valve if ratio_stated is None else replace(valve, critical_ratio=ratio_stated)
     conductance, ratio = valve.iso_6358
     shown = format_quantity(conductance, "conductance", "l/(s*bar)", digits=3)
-    text = f"{key} = {toml_text(reading.document['gas'][key])} is C = {shown} with b = {ratio:.3g} (ISO 6358)"
+    text = f"{key} = {toml_text(reading.document['gas'][key])}"
+    if converted := key != "conductance" or ratio_stated is None:
+        text += f" is C = {shown} with b = {ratio:.3g} (ISO 6358)"
     values = {"gas.critical_ratio": ratio, "gas.valve_lag": valve.valve_lag, "gas.conductance": conductance}
     values = {path: each for path, each in values.items() if each is not None and reading.lacks(path)}
     if valve.critical_ratio is None:
         text += ", as no critical ratio is stated"
         reading = reading.adding({"gas.critical_ratio": values.pop("gas.critical_ratio")})
     text += _remarks(reading, valve)
-    return reading.converting({**values, "gas.valve_source": text}), at_hand
+    if assumed := valve.valve_lag is None and reading.lacks("gas.valve_lag"):
+        text += f"; a valve_lag of {1e3 * valve.lag:g} ms is assumed, as none is stated: ask the seller"
+        reading = reading.assuming({"gas.valve_lag": valve.lag})
+    source = {"gas.valve_source": text} if converted or assumed else {}
+    return reading.converting({**values, **source}), at_hand
 
 
 def _remarks(reading: SceneReading, valve: Valve) -> str:
-    """Source of a valve of the catalogue, and what that does not print or does not allow."""
+    """Source of a valve of the catalogue, and what that does not allow."""
     if not valve.source:
         return ""
     text = f"; {valve.source}"
-    if valve.valve_lag is None and reading.lacks("gas.valve_lag"):
-        text += "; no lag is printed there: state valve_lag"
     ends, pressure = (valve.lowest_pressure, valve.highest_pressure), reading.values.get("gas.pressure")
     low, high = ends
     if pressure is not None and not (low or 0.0) <= pressure <= (high or math.inf):
@@ -67,7 +68,7 @@ def _remarks(reading: SceneReading, valve: Valve) -> str:
 
 
 def _faults_at_hand(reading: SceneReading) -> Iterator[Fault]:
-    """Yield errors of the valves in [design]: no flow or two, and no lag."""
+    """Yield errors of the valves in [design]: no flow or two."""
     for number, each in enumerate(reading.values.get("design.valves", ()), 1):
         valve, table = each.completed, {"file": reading.file, "table": "design"}
         if len(valve.flows) != 1:
@@ -75,8 +76,3 @@ def _faults_at_hand(reading: SceneReading) -> Iterator[Fault]:
             hint = did_you_mean(each.name, known_valves())
             allowed = f"one of {', '.join(FLOWS)}, or a name of the catalogue{hint}"
             yield Fault(**table, key=f"valves[{number}]", problem=count, allowed=allowed)
-        if valve.valve_lag is None:
-            problem, allowed = "it is needed here", 'a time such as "5 ms"'
-            yield Fault(
-                **table, key=f"valves[{number}].valve_lag", value="missing", problem=problem, allowed=allowed
-            )

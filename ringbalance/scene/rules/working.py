@@ -132,7 +132,7 @@ CHECKS: tuple[Check, ...] = (
         *("controller.period", "gas.valve_lag"),
         holds=lambda v: v.period >= v.valve_lag,
         problem="the next sample would be taken before the valve has moved (valve_lag {valve_lag:s})",
-        allowed="at least {valve_lag:s}",
+        allowed="at least {valve_lag:s}; a valve_lag that [gas] does not state is assumed",
     ),
     limit_above_noise("controller.limit", "sensor.amplitude_noise", "um"),
     *(

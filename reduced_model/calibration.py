@@ -39,6 +39,13 @@ def calibrate(scene: AnyScene) -> Calibration:
     Raises: ValueError: a tube whose bends do not fit into its length.
     Source: closed forms for the chamber, checked by finite elements; tables of finite elements for the
         laminar tube, correlations beyond; see the parts.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> calibration = rb.calibrate(scene)
+        >>> flow = calibration.flow_law.evaluate(fill_ratio=0.25, gas_pressure=0.7e6)
+        >>> f"{flow.velocity:.1f} m/s"
+        '14.9 m/s'
     """
     scene = liquid_ring_scene(scene)
     chamber, law = known_chamber_and_law(scene)

@@ -25,8 +25,11 @@ SCENES: Final = ("scene", "first", "second")
 _CALIBRATED: Final = "calibrated"
 
 
-def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """Make a function of the Python interface refuse a scene that was changed without its checks."""
+def checked(function: Callable[P, R], *, module: str | None = None) -> Callable[P, R]:
+    """Make a function of the Python interface refuse a scene that was changed without its checks.
+
+    Args: `module`: in which the result stands, for pickling, if not that of the function.
+    """
     names = tuple(signature(function).parameters)
 
     @wraps(function)
@@ -37,6 +40,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
                 checked_scene(arguments[name])
         return function(*args, **options)
 
+    call.__module__ = module or function.__module__
     return call
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import nullcontext
 from json import dumps
 from types import SimpleNamespace
@@ -16,7 +16,6 @@ from ringbalance.scene.platform.files import staged, write_whole
 from ringbalance.scene.platform.terminal import activity, print_message
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.study import SIZES, Extremes, check_sector, find_extremes
-from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import run_cases as run_scene_cases
 from ringbalance.verification.trade import TradeStudy, trade_study
 
@@ -88,33 +87,4 @@ def extremes_file(options: SimpleNamespace) -> int:
     return 1 if study.broken() else 0
 
 
-@checked
-def run_cases(
-    case_ids: Sequence[str] = (),
-    *,
-    scene: AnyScene,
-    level: Level = "light",
-    mutations: bool = False,
-    workers: int = 1,
-    progress: Callable[[CaseResult], None] | None = None,
-) -> tuple[CaseResult, ...]:
-    """Run several verification cases, or all, and return their results in the order of `case_ids`.
-
-    Args: `level`: "light" leaves heavy cases `not run`. `mutations`: also with each case's mutations.
-        `workers`: processes, this one included. `progress`: called with each result, in order.
-    Raises: KeyError: an unknown case. SceneError: a balancer without liquid.
-
-    Example:
-        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
-        >>> (case,) = rb.run_cases(["claim_01_volume"], scene=scene)
-        >>> case.verdict.value
-        'confirmed'
-    """
-    return run_scene_cases(
-        case_ids,
-        scene=scene,
-        level=level,
-        mutations=mutations,
-        workers=workers,
-        progress=progress,
-    )
+run_cases = checked(run_scene_cases, module=__name__)

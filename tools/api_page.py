@@ -56,12 +56,9 @@ def _prose(text: str) -> str:
 def _attributes(value: Any) -> str:
     if not inspect.isclass(value) or issubclass(value, Exception):
         return ""
-    names = {*dir(value), *getattr(value, "__dataclass_fields__", ())} - set(dir(_base(value)))
+    base = int if issubclass(value, int) else object
+    names = {*dir(value), *getattr(value, "__dataclass_fields__", ())} - set(dir(base))
     return _listed(name for name in names if not name.startswith("_"))
-
-
-def _base(value: type) -> type:
-    return int if issubclass(value, int) else object
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -29,7 +29,7 @@ def document_tables() -> dict[str, str]:
     section = SECTION.collect(Work(scene=scene, level="light"))
     assert section is not None
     return {
-        "liquids": _liquids_table(section["liquids"]),
+        "liquids": markdown(_LIQUID_HEADS, [tuple(_liquid_cells(each)) for each in section["liquids"]]),
         "bores": _bores_table(calibration),
         "rule": rule(calibration),
         "library": _library_table(),
@@ -37,21 +37,14 @@ def document_tables() -> dict[str, str]:
     }
 
 
-def _liquids_table(liquids: list[Record]) -> str:
-    """Table with one row for each liquid."""
-    heads = ("liquid", "viscosity", "kg/m³", "gas", "tube runs", "velocity", "k")
-    more = ("Eq. 18 reads", "Eq. 19 is off by", "50 is")
-    return markdown((*heads, *more), [tuple(_liquid_cells(record)) for record in liquids])
-
-
 _LIQUID_HEADS: Final = (
-    *("Liquid", "Viscosity", "Density\nkg/m³", "Gas", "The tube runs", "Velocity", "k"),
-    *("Eq. 18\nreads", "Eq. 19\nis off by"),
+    *("liquid", "viscosity", "kg/m³", "gas", "tube runs", "velocity", "k"),
+    *("Eq. 18 reads", "Eq. 19 is off by", "50 is"),
 )
 
 
 def _liquid_cells(record: Record) -> Sequence[str]:
-    """Cells of one liquid under _LIQUID_HEADS, and verdict on k = 50; a star: not with the scene's gas."""
+    """Cells of one liquid under `_LIQUID_HEADS`; a star: not with the scene's gas."""
     runs = record["runs"]
     star = "" if record["starts_at_scene_pressure"] else "*"
     return (

@@ -127,27 +127,17 @@ def _between(table: str, first: Sequence[float], second: Sequence[float], index:
 
 
 def solve_point(
-    *,
-    table: str,
-    a: float,
-    b: float,
-    system: FlowSystem,
-    start: FlowSolution | None,
-    settings: NewtonSettings,
+    column: Column, system: FlowSystem, settings: NewtonSettings, a: float, start: FlowSolution | None
 ) -> FlowSolution:
-    """Flow at one point of a rectangle.
-
-    Args: `table`: name of the rectangle. `a`: first coordinate. `b`: second coordinate. `system`: of the
-        section. `start`: a neighbouring flow on the same mesh. `settings`: of Newton's method.
-    """
-    if table.startswith("slow"):
-        kl, s = slow_pair(a, b)
-        return solve_section(system=system, kl=kl, s=s, start=start, settings=settings)
-    rotation, inverse_s = fast_pair(a, b)
-    if inverse_s == 0.0:
-        return solve_section_without_inertia(system=system, rotation_reynolds=rotation)
-    kl = rotation**2 * inverse_s
-    return solve_section(system=system, kl=kl, s=1 / inverse_s, start=start, settings=settings)
+    """Flow at one point of a path. Args: `start`: a neighbouring flow on the same mesh."""
+    if column.table.startswith("slow"):
+        kl, s = slow_pair(a, column.b)
+    else:
+        rotation, inverse_s = fast_pair(a, column.b)
+        if inverse_s == 0.0:
+            return solve_section_without_inertia(system=system, rotation_reynolds=rotation)
+        kl, s = rotation**2 * inverse_s, 1 / inverse_s
+    return solve_section(system=system, kl=kl, s=s, start=start, settings=settings)
 
 
 def systems(settings: TableSettings) -> list[FlowSystem]:
@@ -168,10 +158,7 @@ def _all_values(
         solution = flow
         if level != settings.path_level:
             moved = transfer(source=meshes[settings.path_level], solution=flow, target=mesh)
-            start = replace(flow, vector=moved)
-            solution = solve_point(
-                table=column.table, a=a, b=column.b, system=mesh, start=start, settings=newton
-            )
+            solution = solve_point(column, mesh, newton, a, replace(flow, vector=moved))
         if not solution.status.ok:
             raise ArithmeticError(f"{column.table} a = {a}, b = {column.b}: {solution.status.text}")
         values.append(friction_ratio(solution))
@@ -202,7 +189,7 @@ def run_column(*, column: Column, folder: Path, settings: TableSettings) -> int:
 def _path(column: Column, system: FlowSystem, settings: TableSettings) -> list[FlowSolution]:
     """Flows at the column's points on one mesh, in short steps where further branches exist."""
     newton = NewtonSettings(max_iterations=12)
-    solve = partial(_solve_at, column, system, newton)
+    solve = partial(solve_point, column, system, newton)
     easy = [a for a in column.points if _kl(column, a) <= settings.branch_kl]
     hard = [a for a in column.points if _kl(column, a) > settings.branch_kl]
     short = StepRule(first=settings.branch_step, largest=settings.branch_step, smallest=0.002)
@@ -222,12 +209,6 @@ def _kl(column: Column, a: float) -> float:
         return slow_pair(a, column.b)[0]
     rotation, inverse_s = fast_pair(a, column.b)
     return rotation**2 * inverse_s
-
-
-def _solve_at(
-    column: Column, system: FlowSystem, settings: NewtonSettings, a: float, start: FlowSolution | None
-) -> FlowSolution:
-    return solve_point(table=column.table, a=a, b=column.b, system=system, start=start, settings=settings)
 
 
 def settings_hash(settings: TableSettings) -> str:

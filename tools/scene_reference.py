@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from pathlib import Path
 
 from ringbalance.controller.eccentric_mass.scene_records import ECCENTRIC_MASS
 from ringbalance.scene import known_liquids
@@ -14,8 +12,6 @@ from ringbalance.scene.platform.files import packaged_rows
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import DIMENSIONS
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "scene-file.md"
-BLOCK = re.compile(r"<!-- table: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
 WIDTHS = "uncertainty"
 MANY = 8
 """Largest number of units of a quantity that are listed one by one."""

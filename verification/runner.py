@@ -176,10 +176,16 @@ def run_cases(
     """Run several cases, or all, and return their results in the order asked for.
 
     An interrupt ends the run and leaves no process behind.
-    Args: `level`: "light" leaves heavy cases `not run`. `workers`: processes, this one included. `progress`:
-        called with each result as it comes, in order.
+    Args: `level`: "light" leaves heavy cases `not run`. `mutations`: also with each case's mutations.
+        `workers`: processes, this one included. `progress`: called with each result as it comes, in order.
     Raises: KeyError: an unknown case.
     Raises: SceneError: a balancer without liquid.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> (case,) = rb.run_cases(["claim_01_volume"], scene=scene)
+        >>> case.verdict.value
+        'confirmed'
     """
     scene = liquid_ring_scene(scene)
     ids = tuple(case_ids) or tuple(definition.id for definition in load_cases())

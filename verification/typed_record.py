@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from enum import Enum
-from functools import cache
+from functools import cache, partial
 from types import MappingProxyType, NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -64,9 +64,8 @@ def plain(value: Any) -> Any:
     return value.value if isinstance(value, Enum) else value
 
 
-@cache
-def _annotations(kind: type) -> Mapping[str, Any]:
-    return MappingProxyType(get_type_hints(kind, include_extras=True))
+_annotations = cache(partial(get_type_hints, include_extras=True))
+"""Annotation of each field of a record, by name."""
 
 
 def _record(kind: type, table: Any, path: str, errors: list[str]) -> Any:

@@ -80,13 +80,6 @@ def stands(plant: Record, motion: Record) -> tuple[float, float]:
     return front(plant, motion, motion.state[X]), shown(plant, motion, motion.state[X])
 
 
-@in_place
-def resume(plant: Record, motion: Record, position: float) -> None:
-    """Restore lifted liquid with its front at a fraction of the path, from the fill that `shown` gives."""
-    motion.started = motion.state[X] + motion.direction * _passed(plant, motion, position)
-    motion.state[X] = motion.started - motion.direction * (position - motion.front) * plant.hold_up
-
-
 @inlined
 def arrived(plant: Record, motion: Record, x: float) -> float:
     """Distance of the front past the crest's end, a fraction of the path."""

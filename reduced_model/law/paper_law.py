@@ -155,6 +155,12 @@ def paper_law(scene: AnyScene) -> PaperLaw:
 
     Raises: SceneError: a balancer without liquid.
     Source: Eqs. 4 and 19; lambda = 72 mm.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> law = rb.paper_law(scene)
+        >>> f"{law.evaluate(fill_ratio=0.25, gas_pressure=0.7e6).velocity:.2f} m/s"
+        '5.24 m/s'
     """
     scene = liquid_ring_scene(scene)
     volume = paper.chamber_volume_paper(disc=scene.disc)

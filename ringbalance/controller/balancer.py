@@ -471,10 +471,10 @@ def inputs_of(scene: SceneFile, width: Callable[[str, float], float] | None = No
     return tuple(inputs)
 
 
-def rotor_within(amplitude: float, *, stated: bool) -> Demand:
+def rotor_within(amplitude: float, *, code: str = ROTOR_AMPLITUDE, stated: bool) -> Demand:
     """Demand on the vibration of the rotor at the end of its run, m, which a sensor's runout hides."""
     return Demand(
-        code=ROTOR_AMPLITUDE,
+        code=code,
         outcome="final_amplitude",
         sense=AT_MOST,
         required=amplitude,

@@ -48,6 +48,12 @@ def finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
+def as_real(matrix: npt.ArrayLike) -> FloatArray:
+    """Matrix with each complex number c as ((Re c, -Im c), (Im c, Re c)), shape (2 n, 2 m)."""
+    values = np.asarray(matrix, dtype=np.complex128)
+    return np.kron(values.real, np.eye(2)) + np.kron(values.imag, [[0.0, -1.0], [1.0, 0.0]])
+
+
 def within_since(time: FloatArray, values: FloatArray, *, limit: float) -> float | None:
     """Time from which on values stay within a limit to the end; None: the last one exceeds it."""
     above = np.flatnonzero(values > limit)

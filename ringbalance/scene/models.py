@@ -24,10 +24,7 @@ from ringbalance.scene.keys.declaration import (
     unused,
 )
 from ringbalance.scene.keys.derivations import (
-    angle_of_chambers,
-    direction_of_gas_hole,
     even_number_of_chambers,
-    radius_of_gas_hole,
 )
 from ringbalance.scene.keys.fields import (
     NOT_NEGATIVE,
@@ -96,7 +93,7 @@ class Disc:
             "outer_radius - inner_radius",
             "disc.chambers",
             otherwise="360 deg / chambers; one of both is **needed**",
-            rule=angle_of_chambers,
+            rule=lambda chambers: 2 * math.pi / chambers,
         ),
         UNCERTAIN,
         Shown("central angle of a chamber", "deg"),
@@ -165,7 +162,7 @@ class Disc:
             "distance of that hole from the axis; never under liquid",
             "disc.gas_hole_diameter",
             also=("gas.inlet_radius",),
-            rule=radius_of_gas_hole,
+            rule=lambda _diameter, inlet_radius: inlet_radius,
         ),
         UNCERTAIN,
         Shown("radius of the gas hole", "mm"),
@@ -176,7 +173,8 @@ class Disc:
             '"outward" with gas_hole_diameter',
             "where the hole blows: at the ring, along the shaft, or at the inner wall",
             "disc.gas_hole_diameter",
-            rule=direction_of_gas_hole,
+            # At the ring the jet digs deepest.
+            rule=lambda _diameter: "outward",
         ),
         Shown("direction of the gas hole"),
     ] = None

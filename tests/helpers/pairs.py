@@ -15,8 +15,9 @@ from ringbalance.reduced_model.injection.dynamics import (
     Event,
     P,
     U,
+    X,
 )
-from ringbalance.reduced_model.injection.lift import resume, stands
+from ringbalance.reduced_model.injection.lift import _passed, stands
 from ringbalance.reduced_model.injection.pair import at_rest, fills_at
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.arrays import FloatArray
@@ -174,7 +175,10 @@ def packed(plant: npt.NDArray[np.void], *, fill: float, primed: bool, motion: Mo
     }.items():
         state[name] = value
     if state["lifting"][0]:
-        resume(known, state[0], place)
+        # From the fill that is shown, with the front at `place`.
+        one = state[0]
+        one["started"] = one["state"][X] + direction * _passed(known, one, place)
+        one["state"][X] = one["started"] - direction * (place - begun) * float(known["hold_up"])
     return state
 
 

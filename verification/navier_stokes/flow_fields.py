@@ -30,8 +30,6 @@ LARGEST_KL: Final = 1e6
 """R Re up to which the section is drawn; near it further steady flows appear."""
 LARGEST_ROTATION: Final = 1e4
 """R up to which the drawing's mesh resolves the layer at the wall."""
-LARGEST_END_REYNOLDS: Final = 2000.0
-"""Beyond, steady laminar flow is not to be expected."""
 _END_SCALE: Final = 5.0
 _SECTION: Final = SectionMesh(around=6, across=9, wall_ratio=15.0)
 _WINDOWS: Final = {"entrance": (-2.5, 5.0, 2.5), "exit": (-2.0, 8.0, 2.5)}

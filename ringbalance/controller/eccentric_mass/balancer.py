@@ -23,6 +23,7 @@ from ringbalance.controller.balancer import (
     RunResult,
     Setting,
     Settings,
+    rotor_within,
     settles_within,
 )
 from ringbalance.controller.eccentric_mass.devices import (
@@ -62,7 +63,6 @@ from ringbalance.controller.eccentric_mass.targets import reach_of
 from ringbalance.controller.eccentric_mass.tried_settings import trials_of
 from ringbalance.controller.rotor import CommonRotor, Rotors, rotor_fault
 from ringbalance.controller.trials import MEASURE_INPUT, DrawnInput, Information, Trials
-from ringbalance.results.requirements import AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.draws import run_noise
@@ -97,11 +97,9 @@ class EccentricMassBalancer(Balancer):
 
     def settings(self) -> tuple[Setting, ...]:
         """Gains of the drives, each with the scene's value and its bounds."""
-        values = {path: value_at(self.scene, path) for path in _GAINS}
+        values = ((path, value_at(self.scene, path)) for path in _GAINS)
         return tuple(
-            Setting(path=path, value=value, lowest=value / _MAX_GAIN_FACTOR, highest=value * _MAX_GAIN_FACTOR)
-            for path, value in values.items()
-            if value > 0
+            Setting.about(path, value, factor=_MAX_GAIN_FACTOR) for path, value in values if value > 0
         )
 
     def run(
@@ -182,17 +180,9 @@ class EccentricMassBalancer(Balancer):
         time = until if requirement.settling_time is None else requirement.settling_time
         settles = settles_within(time, stated=requirement.settling_time is not None)
         allowed = required_residual(scene)
-        if allowed is None:
-            return (settles,)
-        residual = Demand(
-            code="residual",
-            outcome="final_amplitude",
-            sense=AT_MOST,
-            required=allowed,
-            unit="m",
-            stated=True,
+        return (
+            (settles,) if allowed is None else (settles, rotor_within(allowed, code="residual", stated=True))
         )
-        return settles, residual
 
     def trials(self) -> tuple[Trials, ...]:
         """Trials of the strategy's settings; empty for locked masses."""

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
-from ringbalance.scene.arrays import ComplexArray, FloatArray, Record
+from ringbalance.scene.arrays import ComplexArray, FloatArray, Record, as_real
 from ringbalance.scene.platform.compiled import in_place
 
 Numbers = Sequence[float] | FloatArray
@@ -121,14 +121,9 @@ def _generator(model: WhirlModel, speed: float) -> ComplexArray:
     return np.array([[0, 1, 0], [pull, -damping / mass - 2j * w, w * w / mass], [0, 0, 0]])
 
 
-def _along_axes(matrix: ComplexArray) -> FloatArray:
-    """Matrix of x and y in place of x + j y."""
-    return np.kron(matrix.real, np.eye(2)) + np.kron(matrix.imag, [[0.0, -1.0], [1.0, 0.0]])
-
-
 def whirl_transition(model: WhirlModel, speed: float, step: float) -> FloatArray:
     """Exact transition exp(A dt) of the filter's state, shape (6, 6)."""
-    return _along_axes(expm(_generator(model, speed) * step))
+    return as_real(expm(_generator(model, speed) * step))
 
 
 def imbalance_filter(settings: FilterSettings, *, speeds: npt.ArrayLike) -> FilterConstants:
@@ -157,8 +152,8 @@ def imbalance_filter(settings: FilterSettings, *, speeds: npt.ArrayLike) -> Filt
         noise = exact @ exponential[:3, 3:]
         for _ in range(halvings):
             exact, noise = exact @ exact, exact @ noise @ exact.conj().T + noise
-        transition[i] = _along_axes(np.eye(3) + generator * settings.step if settings.euler else exact)
-        process[i] = _along_axes(0.5 * (noise + noise.conj().T))
+        transition[i] = as_real(np.eye(3) + generator * settings.step if settings.euler else exact)
+        process[i] = as_real(0.5 * (noise + noise.conj().T))
         observation[i, range(4), range(4)] = 1.0
         if settings.laboratory:
             observation[i, 2, 1], observation[i, 3, 0] = -w, w

@@ -178,22 +178,11 @@ class ScanLevel:
         return float(low), float(middle), float(high)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Scan:
-    """Best settings at every level of an axis."""
-
-    levels: tuple[ScanLevel, ...]
-    top: ScanLevel
-    """The recommended level."""
-    searched: Sequence[Tried]
-    """The best candidate of every kind of controller at that level, the recommended kind first."""
-
-
 def scanned(
     balancer: Balancer, trials: Sequence[Trials], winners: Sequence[Tried], *, progress: Progress
-) -> Scan | None:
+) -> tuple[tuple[ScanLevel, ...], Sequence[Tried]]:
     """The best settings at the levels of an axis, with more levels until both neighbours of the best are
-    among them; None: there is no axis.
+    among them; both results are empty where there is no axis.
 
     The recommended level is searched as widely as the scene's, and then the others again from its settings,
     so that the result does not depend on the level at which the search began.
@@ -201,7 +190,7 @@ def scanned(
     """
     axis = trials[0].scan_axis
     if axis is None:
-        return None
+        return (), ()
     level = value_at(balancer.scene, axis.name)
     nearest = min(range(len(axis.levels)), key=lambda at: abs(axis.levels[at] - level))
     searched = {nearest: winners} if axis.levels[nearest] == level else {}
@@ -223,8 +212,7 @@ def scanned(
             if top in levels.searched or not served:
                 break
             levels.search(top, progress)
-    ordered = tuple(answered[at] for at in sorted(answered))
-    return Scan(levels=ordered, top=answered[top], searched=levels.searched.get(top, ()))
+    return tuple(answered[at] for at in sorted(answered)), levels.searched.get(top, ())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

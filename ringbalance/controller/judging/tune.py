@@ -68,8 +68,7 @@ def tuned(
     levels: tuple[ScanLevel, ...] = ()
     move = scan or best.verdict != MET
     if winners and (curve or move):
-        result = scanned(balancer, spaces, winners, progress=report)
-        levels, winners_there = (result.levels, result.searched) if result else ((), ())
+        levels, winners_there = scanned(balancer, spaces, winners, progress=report)
         proposed = _worth_judging(winners_there) if move else []
         chosen = best_of(balancer, [best.settings, *proposed], progress=report)
         if chosen != best.settings:

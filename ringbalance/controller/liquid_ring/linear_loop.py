@@ -16,12 +16,10 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from ringbalance.controller.liquid_ring.loop_factor import (
     Margins,
@@ -33,7 +31,7 @@ from ringbalance.controller.liquid_ring.loop_factor import (
 from ringbalance.physics import balancing
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
 from ringbalance.results.rows import Finding
-from ringbalance.scene.arrays import FloatArray, finite
+from ringbalance.scene.arrays import FloatArray, as_real, finite
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import scene_as
@@ -184,7 +182,7 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
     rate = loop_rate(scene, BalancerModel.of(flow_law))
     plant = StateSpace(
         a=np.eye(2),
-        b=_matrix([[-cmath.rect(rate, -lag)]]),
+        b=as_real([[-cmath.rect(rate, -lag)]]),
         c=np.eye(2),
         d=np.zeros((2, 2)),
         inputs=AIR_TIME,
@@ -203,10 +201,10 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
     if integral == 0.0:
         a, b, c, states = [[0.0]], [[1.0]], c[1:], states[2:]
     controller = StateSpace(
-        a=_matrix(a),
-        b=_matrix(b),
-        c=_matrix([c]),
-        d=_matrix([[gain * (1.0 + derivative + half)]]),
+        a=as_real(a),
+        b=as_real(b),
+        c=as_real([c]),
+        d=as_real([[gain * (1.0 + derivative + half)]]),
         inputs=VIBRATION,
         outputs=AIR_TIME,
         states=states,
@@ -224,11 +222,3 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
     if integral * _LEAST_INTEGRAL_STEPS > 1.0:
         findings.append(Finding(code="integral_short", values={"intervals": 1.0 / integral}))
     return replace(loop, findings=tuple(findings))
-
-
-def _matrix(rows: Sequence[Sequence[complex]]) -> FloatArray:
-    """Each complex number as a matrix of two rows and columns."""
-    values: npt.NDArray[np.complex128] = np.array(rows, dtype=np.complex128)
-    return np.asarray(
-        np.kron(values.real, np.eye(2)) + np.kron(values.imag, np.array([[0.0, -1.0], [1.0, 0.0]]))
-    )

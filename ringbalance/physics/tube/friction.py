@@ -176,11 +176,6 @@ def turbulent_share(
     return np.asarray(1 / (1 + np.exp(clipped(sharpness * log_ratio, -300, 300))), dtype=np.float64)
 
 
-def reynolds_number(*, velocity: npt.ArrayLike, bore: float, kinematic_viscosity: float) -> FloatArray:
-    """Reynolds number of the tube, Re = |u| d/nu, u the mean over the bore."""
-    return np.asarray(np.abs(np.asarray(velocity, dtype=np.float64)) * bore / kinematic_viscosity)
-
-
 def rotation_reynolds_number(*, angular_velocity: float, bore: float, kinematic_viscosity: float) -> float:
     """Rotation Reynolds number, R_Om = omega d^2/nu, the inverse of an Ekman number.
 

@@ -34,7 +34,7 @@ from ringbalance.physics.tube.local_losses import (
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio, rotation_table_covers
 from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.designs import Designs, changes_of
+from ringbalance.scene.designs import changes_of
 from ringbalance.scene.errors import by_group, uncertainties
 from ringbalance.scene.models import Scene, Tube
 from ringbalance.scene.uncertain import NORMAL_95, fitted_causes
@@ -97,12 +97,9 @@ def uncertainty_parts(scene: Scene, *, velocity: FloatArray, state: TubeState) -
         that were fitted together. Parts that vanish everywhere are kept.
     Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads are given with the correlations.
     """
-
-    def k_of(designs: Designs) -> FloatArray:
-        return corrected_state(designs.scene, velocity[..., None]).k
-
     errors = uncertainties(scene, among=TUBE_INPUTS, models=False)
-    effects = by_group(errors, changes_of(scene, k_of, errors)[1])
+    _, changes = changes_of(scene, lambda each: corrected_state(each.scene, velocity[..., None]).k, errors)
+    effects = by_group(errors, changes)
     by_input = {f"{INPUT_PART}{name}": effect for name, effect in effects.items()}
     by_model = model_parts(tube=scene.tube, state=state)
     # The scene's joint distribution holds the errors of these causes.

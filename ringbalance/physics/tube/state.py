@@ -13,7 +13,6 @@ from ringbalance.physics.tube.friction import (
     STRAIGHT_CRITICAL_REYNOLDS,
     critical_reynolds,
     friction_factor,
-    reynolds_number,
     rotation_reynolds_number,
     turbulent_friction_ratio,
 )
@@ -86,7 +85,7 @@ def tube_state(scene: Scene, velocity: npt.ArrayLike, *, tube: Tube | None = Non
     tube, nu = tube or scene.tube, scene.liquid.kinematic_viscosity
     return tube_state_at(
         tube=tube,
-        reynolds=reynolds_number(velocity=velocity, bore=tube.bore, kinematic_viscosity=nu),
+        reynolds=np.abs(np.asarray(velocity, dtype=np.float64)) * tube.bore / nu,
         rotation_reynolds=rotation_reynolds_number(
             angular_velocity=scene.rotor.speed, bore=tube.bore, kinematic_viscosity=nu
         ),

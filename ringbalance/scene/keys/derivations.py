@@ -36,21 +36,6 @@ def even_number_of_chambers(central_angle: float) -> int | None:
     return nearest if close and nearest >= LEAST_CHAMBERS and nearest % 2 == 0 else None
 
 
-def angle_of_chambers(chambers: int) -> float:
-    """Central angle of chambers that fill the circle, rad."""
-    return 2 * math.pi / chambers
-
-
-def radius_of_gas_hole(_diameter: float, inlet_radius: float | None) -> float | None:
-    """Radius of a hole that blows into a chamber, m: that at which gas enters it."""
-    return inlet_radius
-
-
-def direction_of_gas_hole(_diameter: float) -> str:
-    """Direction of a hole that no scene turns: at the ring, where its jet digs deepest."""
-    return "outward"
-
-
 def permissible_unbalance(*, grade: float, mass: float, speed: float) -> float:
     """U_per = G M / W of a whole rigid rotor, kg m, with G in m/s; 9549 G M / n in g mm, mm/s and rpm.
 

@@ -69,19 +69,11 @@ def surface_tension(liquid: Liquid) -> FloatArray:
     return np.where(np.greater(liquid.density, METAL_DENSITY_KG_M3), _METAL_TENSION_N_M, _WATER_TENSION_N_M)
 
 
-def _rpm(speed: float) -> str:
-    return f"{_ROUNDED * speed * 30 / math.pi:.4g} rpm"
-
-
 def _fastest(values: Any, limit: float) -> dict[str, Any]:
     """Velocity of the rim, m/s, its limit, and the speed at that limit."""
     outer = values.outer_radius
-    return {"rim": values.speed * outer, "most": limit, "fastest": _rpm(limit / outer)}
-
-
-def _gas_limit(values: Any) -> float:
-    """Largest omega R2 of a gas column, (R T/2)^(1/2), m/s."""
-    return math.sqrt(2 * _LARGEST_EXPONENT * AIR_CONSTANT * values.temperature)
+    fastest = f"{_ROUNDED * limit / outer * 30 / math.pi:.4g} rpm"
+    return {"rim": values.speed * outer, "most": limit, "fastest": fastest}
 
 
 def _letters(values: Any) -> dict[str, Any]:
@@ -182,7 +174,8 @@ CHECKS: tuple[Check, ...] = (
     condition(
         "gas_column_holds",
         *(*_RIM, "gas.temperature"),
-        more=lambda v: _fastest(v, _gas_limit(v)),
+        # The largest omega R2 of a gas column is (R T/2)^(1/2).
+        more=lambda v: _fastest(v, math.sqrt(2 * _LARGEST_EXPONENT * AIR_CONSTANT * v.temperature)),
         holds=lambda v: v.rim <= v.most,
         problem="the rim would move at {rim:.4g} m/s, too fast to know the gas pressure on the liquid from "
         'one on the shaft (gas.measured_at = "shaft")',

@@ -238,7 +238,8 @@ class Sweep(Result):
     def sensitivity(self, *, total: bool = False) -> Shares:
         """Share of the variance of each result that each axis explains, and its half-width (95 %).
 
-        For samples, see `first_order`; empty for a grid, and for results with too few points or one value.
+        For samples, see `first_order`; empty for a grid, and for results with too few points, one
+        value, or a variance that a few points carry.
         Shares below zero, or with a sum above 1, are noise of the sample: an interval that contains zero
         shows no influence; more points narrow it.
         Args: `total`: True includes interactions of an axis with others, see `total_order`.

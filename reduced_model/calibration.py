@@ -10,12 +10,11 @@ import numpy as np
 
 from ringbalance.physics.tube.loss import VELOCITIES, tube_loss
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.calibration_rows import calibration_rows
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, calibrate_chamber
 from ringbalance.reduced_model.chamber.contributions import AsynchronousInstability
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.core import Answers
-from ringbalance.reduced_model.documents import calibration_document
+from ringbalance.reduced_model.documents import calibration_document, calibration_rows
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.files import load_law
 from ringbalance.reduced_model.law.flow_law import CALIBRATED, UNCHECKED, BalancerModel

@@ -335,7 +335,5 @@ def _written(value: Any, takes: ValueReader | Entries, *, digits: int = 6) -> st
     return format_given(value, unit, digits=digits) if unit else short(float(value), digits=digits)
 
 
-_ROWS: Final[Mapping[str, Callable[..., list[Record]]]] = MappingProxyType(
-    {"liquid_ring": lambda scene: [asdict(row) for row in scene_table(scene)]}
-)
+_ROWS: Final[Mapping[str, Callable[..., list[Record]]]] = MappingProxyType({"liquid_ring": scene_table})
 """Rows of the scene's values by balancer, where its keys alone would not describe them."""

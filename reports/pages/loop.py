@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
 from itertools import groupby
 from typing import Any, Final
 
@@ -216,30 +215,15 @@ INJECTIONS: Final = Section(
 _LINEAR_FILL_CHANGE: Final = 1e-3
 
 
-@dataclass(frozen=True, kw_only=True)
-class _LoopGain:
-    """The proportional loop about equal fills under one law.
+def _loop_gain(scene: Scene, model: BalancerModel) -> Record | None:
+    """The proportional loop about equal fills under one law; None when the gas drives no flow there.
 
     e_(n+1) = (1 - h) e_n with h = Kc dA/dt and dA/dt = kappa |dM/dx| u S/V: a residual changes its sign
     from h = 1 on and grows from h = 2 on.
+    Returns: u; k by Eq. 18 at that velocity, 2p/(rho u^2) - 1; lambda; dA/dt per valve-open time; and h, the
+        fraction of the residual that one operation removes.
     Source: sections 4.2 and 5 of the liquid-ring paper; a discrete first-order loop.
     """
-
-    law: str
-    velocity_m_s: float
-    """u at equal fills."""
-    drag_coefficient: float
-    """k by Eq. 18 at that velocity, 2p/(rho u^2) - 1."""
-    moment_per_transferred_mass_m: float
-    """lambda at equal fills."""
-    slope_m_per_s: float
-    """Decrease of the vibration per second of valve-open time, m/s."""
-    gain_per_operation: float
-    """h: fraction of the residual that one operation removes."""
-
-
-def _loop_gain(scene: Scene, model: BalancerModel) -> _LoopGain | None:
-    """Linearise the loop about equal fills; None when the gas drives no flow there."""
     x, pressure = scene.disc.initial_fill, scene.gas.pressure
     flow = model.flow.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure)
     u = float(flow.velocity)
@@ -249,14 +233,14 @@ def _loop_gain(scene: Scene, model: BalancerModel) -> _LoopGain | None:
     moments = model.moment.pair_vector(fill_ratio=ends, opposite_fill_ratio=2 * x - ends)
     per_fill = float(abs(moments[1] - moments[0])) / (2 * _LINEAR_FILL_CHANGE)
     slope = scene.rotor.influence_coefficient * per_fill * u * model.tube_area / model.chamber_volume
-    return _LoopGain(
-        law=model.name,
-        velocity_m_s=u,
-        drag_coefficient=2 * pressure / (model.density * u**2) - 1,
-        moment_per_transferred_mass_m=per_fill / (model.density * model.chamber_volume),
-        slope_m_per_s=slope,
-        gain_per_operation=scene.controller.proportional * slope,
-    )
+    return {
+        "law": model.name,
+        "velocity_m_s": u,
+        "drag_coefficient": 2 * pressure / (model.density * u**2) - 1,
+        "moment_per_transferred_mass_m": per_fill / (model.density * model.chamber_volume),
+        "slope_m_per_s": slope,
+        "gain_per_operation": scene.controller.proportional * slope,
+    }
 
 
 def _consequences(work: Work) -> Record:
@@ -264,7 +248,7 @@ def _consequences(work: Work) -> Record:
     gains = [_loop_gain(work.ring, model) for model in (paper_model(work.ring), work.calibration.model)]
     (paper,) = judged_all(balancer_of(work.ring, flow_law="paper"), [{}])
     return {
-        "gain": [asdict(each) for each in gains if each is not None],
+        "gain": [each for each in gains if each is not None],
         "paper": judgement_record(paper),
     }
 

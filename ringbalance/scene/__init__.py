@@ -7,7 +7,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ringbalance.scene.describe import Row as Row
     from ringbalance.scene.describe import scene_fault as scene_fault
     from ringbalance.scene.describe import scene_table as scene_table
     from ringbalance.scene.faults import Fault as Fault
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from ringbalance.scene.platform.files import write_whole as write_whole
 
 _NAMES = {
-    "describe": ("Row", "scene_fault", "scene_table"),
+    "describe": ("scene_fault", "scene_table"),
     "faults": ("Fault", "SceneError"),
     "liquids": ("KnownLiquid", "known_liquids", "liquid_at"),
     "loader": ("bundled_scene", "load_scene", "read_scene", "scene_from"),

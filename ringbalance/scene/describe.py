@@ -20,26 +20,6 @@ from ringbalance.scene.units import DIMENSIONS, format_quantity, shortest_quanti
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
-    """One line of the table of a scene."""
-
-    group: str
-    """Heading of the group, such as "Disc"."""
-    quantity: str
-    """Name with symbol, such as "outer radius R2"."""
-    value: str
-    """Value with its unit."""
-    note: str
-    """Meaning of the value; may be empty."""
-    origin: str
-    """"given", "inferred", "assumed", "measured" or "default"."""
-    uncertainty: str
-    """Expanded (95 %), with its unit; empty where none is stated."""
-    path: str
-    """Path of the value in the scene, such as "tube.bore"."""
-
-
-@dataclass(frozen=True, kw_only=True)
 class _SceneLine:
     path: str
     shown: Shown
@@ -77,8 +57,11 @@ def _described_lines() -> Iterator[_SceneLine]:
 _LINES: Mapping[str, _SceneLine] = MappingProxyType({line.path: line for line in _described_lines()})
 
 
-def scene_table(scene: Scene) -> tuple[Row, ...]:
-    """A scene line by line, in groups; a value that the file does not give has the origin "default"."""
+def scene_table(scene: Scene) -> list[dict[str, str]]:
+    """A scene line by line, in groups, as texts by name; expanded uncertainties (95 %).
+
+    A value that the file does not give has the origin "default".
+    """
     liquid = scene.liquid
     sources = {"liquid.name": liquid.source}
     relative = {
@@ -104,17 +87,17 @@ def scene_table(scene: Scene) -> tuple[Row, ...]:
                 fraction = relative.get(path, width.half_width if width is not None else 0.0)
                 uncertainty = f"{100 * fraction:.3g} %" if fraction else ""
             rows.append(
-                Row(
-                    group=group,
-                    quantity=line.shown.name,
-                    value=line.shown.absent if value is None else _written(line, value),
-                    note="; ".join(note for note in (line.shown.note, sources.get(path, "")) if note),
-                    origin=scene.origin_of(path),
-                    uncertainty=uncertainty,
-                    path=path,
-                )
+                {
+                    "group": group,
+                    "quantity": line.shown.name,
+                    "value": line.shown.absent if value is None else _written(line, value),
+                    "note": "; ".join(note for note in (line.shown.note, sources.get(path, "")) if note),
+                    "origin": scene.origin_of(path),
+                    "uncertainty": uncertainty,
+                    "path": path,
+                }
             )
-    return tuple(rows)
+    return rows
 
 
 def _line_at(path: str) -> _SceneLine:

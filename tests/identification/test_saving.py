@@ -76,9 +76,9 @@ def test_values_uncertainties_and_origins() -> None:
     assert scene.origin_of("tube.bore") == "measured"
     assert scene.origin_of("tube.extra_loss") == "inferred"
     assert scene.origin_of("tube.length") == "assumed"
-    rows = {row.path: row for row in scene_table(scene)}
-    assert rows["disc.lambda_factor"].value == "0.97"
-    assert rows["disc.lambda_factor"].origin == "measured"
+    rows = {row["path"]: row for row in scene_table(scene)}
+    assert rows["disc.lambda_factor"]["value"] == "0.97"
+    assert rows["disc.lambda_factor"]["origin"] == "measured"
     (bore, factor, *_), (finding,) = scene.measured.quantities, scene.measured.findings
     assert (bore.unit, bore.before, bore.before_high, bore.value, bore.low) == ("mm", 1.54, 1.68, 1.4, 1.38)
     assert (factor.unit, factor.before, factor.before_low) == ("1", 1.0, None)

@@ -15,7 +15,7 @@ from page_modules import in_node, needs_node, panel_content, panel_scene
 
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.export.blocks import Block, controller_block, disc_block
-from ringbalance.panels.settings import ranges_of
+from ringbalance.panels.content import ranges_of
 from ringbalance.reduced_model.calibration import chamber_and_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.results.requirements import Proportion

@@ -106,7 +106,7 @@ def test_every_description_of_a_scene_reaches_its_table() -> None:
         if table.record is not None
         for entry in descriptions_of(table.record).values()
     }
-    described = {row.quantity for each in kinds for row in scene_table(each)}
+    described = {row["quantity"] for each in kinds for row in scene_table(each)}
     optional = {"critical pressure ratio b", "dead volume", "valve lag", "gas inlet radius", "mass"}
     optional |= {"measured factor on lambda", "geometry of a chamber", "runout", "phase of the runout"}
     optional |= {"leak to ambient", "leak from the supply", "relative humidity of the supply"}

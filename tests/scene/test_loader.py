@@ -270,16 +270,16 @@ def test_trial_sequence_alternates_opposites(chambers: int) -> None:
 
 def test_table_of_a_scene(newcomer_document: dict[str, Any], load: Load) -> None:
     newcomer_document["uncertainty"] = {"bore": "0.02 mm", "lag_angle": "3 deg", "speed": "1 %"}
-    rows = {(row.group, row.quantity): row for row in scene_table(load(newcomer_document))}
-    assert rows["Disc", "outer radius R2"].value == "60 mm"
-    assert rows["Rotor", "speed"].value == "6000 rpm"
-    assert rows["Rotor", "speed"].uncertainty == "1 %"
-    assert rows["Rotor", "lag angle"].uncertainty == "3 deg"
-    assert (rows["Rotor", "speed"].origin, rows["Rotor", "lag angle"].origin) == ("given", "default")
-    assert rows["Connecting tube", "bore d"].uncertainty == "0.02 mm"
-    assert rows["Connecting tube", "siphon crest radius"].value == "none: always full"
-    assert rows["Liquid", "temperature"].value == "25 degC"
-    assert rows["Run", "tolerance"].value == "1 %"
+    rows = {(row["group"], row["quantity"]): row for row in scene_table(load(newcomer_document))}
+    assert rows["Disc", "outer radius R2"]["value"] == "60 mm"
+    assert rows["Rotor", "speed"]["value"] == "6000 rpm"
+    assert rows["Rotor", "speed"]["uncertainty"] == "1 %"
+    assert rows["Rotor", "lag angle"]["uncertainty"] == "3 deg"
+    assert (rows["Rotor", "speed"]["origin"], rows["Rotor", "lag angle"]["origin"]) == ("given", "default")
+    assert rows["Connecting tube", "bore d"]["uncertainty"] == "0.02 mm"
+    assert rows["Connecting tube", "siphon crest radius"]["value"] == "none: always full"
+    assert rows["Liquid", "temperature"]["value"] == "25 degC"
+    assert rows["Run", "tolerance"]["value"] == "1 %"
 
 
 def test_a_scene_is_named_as_the_user_named_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -33,7 +33,7 @@ def test_origins_of_a_scene(newcomer_document: dict[str, Any], load: Load) -> No
     assert scene.origin_of("tube.length") == "given"
     assert scene.origin_of("tube.roughness") == scene.origin_of("tolerance") == "default"
     assert scene.origin_of("rotor.initial_phase") == "measured"
-    rows = {row.quantity: row.origin for row in scene_table(scene)}
+    rows = {row["quantity"]: row["origin"] for row in scene_table(scene)}
     assert (rows["bore d"], rows["vibration at the start"]) == ("assumed", "measured")
     with pytest.raises(ValueError, match=r"no key 'tube\.boer'"):
         scene.origin_of("tube.boer")
@@ -105,4 +105,4 @@ def test_requirement(newcomer_document: dict[str, Any], load: Load) -> None:
     assert required.grade == pytest.approx(2.5e-3)
     assert scene.with_values({"requirement.grade": "G 2.5"}).requirement.grade == required.grade
     assert (required.correction_moment, scene.rotor.mass) == (pytest.approx(9e-4), 20.0)
-    assert {"balance quality grade", "mass"} <= {row.quantity for row in scene_table(scene)}
+    assert {"balance quality grade", "mass"} <= {row["quantity"] for row in scene_table(scene)}

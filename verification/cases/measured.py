@@ -76,11 +76,11 @@ def smooth_tubes(scene: Scene, level: Level, defect: str | None = None) -> Evide
         "transitional": points.where((reynolds >= _LAMINAR_TO_RE) & (reynolds < _TURBULENT_FROM_RE)),
         "turbulent": points.where(reynolds >= _TURBULENT_FROM_RE),
     }
-    numbers = statistics.numbers() | with_left_out(points, left_out)
+    numbers = statistics | with_left_out(points, left_out)
     for name, part in parts.items():
-        numbers |= {f"{name}_{key}": value for key, value in part.statistics.numbers().items()}
+        numbers |= {f"{name}_{key}": value for key, value in part.statistics.items()}
     return Evidence(
-        quantities=as_found(share_within=statistics.share_within, bias=abs(numbers["turbulent_bias"])),
+        quantities=as_found(share_within=statistics["share_within"], bias=abs(numbers["turbulent_bias"])),
         numbers=numbers,
         series=(parts["turbulent"].over_reynolds("smooth tubes"),),
     )
@@ -103,14 +103,14 @@ def rough_tubes(scene: Scene, level: Level, defect: str | None = None) -> Eviden
     grain = points.columns["reynolds"] * np.sqrt(points.measured / 8) * wall
     rough = points.where(grain > _FULLY_ROUGH).statistics
     return Evidence(
-        quantities=as_found(share_within=statistics.share_within, fully_rough=abs(rough.bias)),
+        quantities=as_found(share_within=statistics["share_within"], fully_rough=abs(rough["bias"])),
         numbers={
-            **statistics.numbers(),
+            **statistics,
             **with_left_out(points),
             "worst": np.max(points.predicted / points.measured - 1),
-            "rough_points": rough.points,
-            "rough_bias": rough.bias,
-            "rough_standard_deviation": rough.standard_deviation,
+            "rough_points": rough["points"],
+            "rough_bias": rough["bias"],
+            "rough_standard_deviation": rough["standard_deviation"],
         },
         series=tuple(
             points.where(wall == roughness).over_reynolds(f"a tube with ks/d = {roughness:.2g}")
@@ -138,14 +138,14 @@ def ducts(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         )
     )
     return Evidence(
-        quantities=as_found(share_within=every.share_within, laminar=abs(laminar.bias)),
+        quantities=as_found(share_within=every["share_within"], laminar=abs(laminar["bias"])),
         numbers={
-            **every.numbers(),
-            "laminar_points": laminar.points,
-            "laminar_bias": laminar.bias,
-            "turbulent_points": turbulent.points,
-            "turbulent_bias": turbulent.bias,
-            "turbulent_standard_deviation": turbulent.standard_deviation,
+            **every,
+            "laminar_points": laminar["points"],
+            "laminar_bias": laminar["bias"],
+            "turbulent_points": turbulent["points"],
+            "turbulent_bias": turbulent["bias"],
+            "turbulent_standard_deviation": turbulent["standard_deviation"],
             **with_left_out(narrow, {"wide": points.where(wide)}),
         },
         series=(friction(sets[0], mutation=mutation).over_reynolds("a rectangular duct (2.9 to 1)"),),

@@ -35,28 +35,6 @@ _MIN_SERIES: Final = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class _ModelStatistics:
-    """Errors of a model against measurements, relative to the measured values."""
-
-    points: int
-    series: int
-    bias: float
-    """Geometric mean of predicted over measured, less one: positive where the model predicts too high."""
-    bias_uncertainty: float
-    """Expanded uncertainty (95 %) of the bias."""
-    standard_deviation: float
-    """Scatter of the model alone, less the measurements' own."""
-    share_within: float
-    """Fraction of the points with a deviation within both 95 % uncertainties, the stated one and U_D."""
-    width_needed: float
-    """Factor on both uncertainties with which 95 % of the points lie within them."""
-
-    def numbers(self) -> dict[str, float]:
-        """Numbers for a case's text, by the names of `_ModelStatistics`."""
-        return {key: float(value) for key, value in vars(self).items()}
-
-
-@dataclass(frozen=True, kw_only=True)
 class Predictions:
     """Measured points with their predictions, all fields of one length, SI."""
 
@@ -92,12 +70,16 @@ class Predictions:
         return float(np.mean(self.used <= 1))
 
     @property
-    def statistics(self) -> _ModelStatistics:
-        """Statistics of ln(predicted/measured).
+    def statistics(self) -> dict[str, float]:
+        """Statistics of ln(predicted/measured), relative to the measured values.
 
         bias = exp(mean) - 1; s_model^2 = s^2 - (U_D/2)^2, zero where the measurements alone explain the
         scatter.  The points of a series share their systematic errors, so the bias is known to t s/sqrt(n) of
         the n means of the series; with fewer than three series, to U_D.
+        Returns: Numbers of points and series; the bias, positive where the model predicts too high, with its
+            expanded uncertainty (95 %); the scatter of the model alone; the fraction of the points with a
+            deviation within both 95 % uncertainties, the stated one and U_D; and the factor on both with
+            which 95 % of the points lie within them.
         Source: McGrattan and Toman, Metrologia 48 (2011) 173, for the split of the scatter.
         """
         ratio, names = np.log(self.predicted / self.measured), np.unique(self.series)
@@ -108,15 +90,15 @@ class Predictions:
             t = float(special.stdtrit(means.size - 1, 0.975))
             bias_uncertainty = t * float(np.std(means, ddof=1)) / math.sqrt(means.size)
         unexplained = float(np.var(ratio, ddof=1) - np.mean((self.uncertainty / 2) ** 2))
-        return _ModelStatistics(
-            points=ratio.size,
-            series=names.size,
-            bias=self.bias,
-            bias_uncertainty=bias_uncertainty,
-            standard_deviation=math.sqrt(max(unexplained, 0.0)),
-            share_within=self.share_within,
-            width_needed=float(np.quantile(self.used, 0.95)),
-        )
+        return {
+            "points": ratio.size,
+            "series": names.size,
+            "bias": self.bias,
+            "bias_uncertainty": bias_uncertainty,
+            "standard_deviation": math.sqrt(max(unexplained, 0.0)),
+            "share_within": self.share_within,
+            "width_needed": float(np.quantile(self.used, 0.95)),
+        }
 
     @property
     def verdict(self) -> Verdict:
@@ -237,7 +219,7 @@ def study(
         return dataclasses.replace(evidence, numbers=numbers)
     rest = [data.where(series) for data, series in zip(sources, teaching, strict=True) if series.any()]
     teachers = compare(*rest, mutation=defect)
-    width = math.hypot(teachers.bias, 2 * teachers.statistics.standard_deviation)
+    width = math.hypot(teachers.bias, 2 * teachers.statistics["standard_deviation"])
     stated = float(np.mean(teachers.stated / teachers.predicted))
     return dataclasses.replace(
         evidence,
@@ -251,7 +233,7 @@ def data_evidence(*sets: Observations, unit: str, mutation: str | None = None) -
     points = compare(*sets, mutation=mutation)
     return Evidence(
         quantities=as_found(share_within=points.share_within, bias=abs(points.bias)),
-        numbers=points.statistics.numbers(),
+        numbers=points.statistics,
         series=(points.scatter(KINDS[sets[0].kind].title, unit),),
     )
 
@@ -283,7 +265,7 @@ def data_document(path: Path) -> dict[str, Any]:
         "limit": PROMISED,
         "verdict": points.verdict.value,
         "hint": hint if fanning else "",
-        "statistics": vars(points.statistics),
+        "statistics": points.statistics,
         "series": series,
         "points": [
             dict(zip(("series", "measured", "predicted", "stated", "U_D"), row, strict=True))

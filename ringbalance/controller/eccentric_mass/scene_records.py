@@ -54,6 +54,7 @@ from ringbalance.scene.kinds import (
     Contradiction,
     SceneKind,
     check,
+    condition,
     limit_above_noise,
     reader_of,
     written,
@@ -348,29 +349,6 @@ def _imbalance_in_rotor(imbalance: float, rotor: float) -> Contradiction | None:
     )
 
 
-def _masses_fit_track(arc: float, radius: float) -> Contradiction | None:
-    """Both masses fit on the track: l <= pi r_b."""
-    limit = math.pi * radius
-    if arc <= limit * (1 + _ROUNDING_FRACTION):
-        return None
-    return Contradiction(
-        problem="two masses of this length do not fit on the track",
-        allowed=f"above 0 mm and at most pi * guide_radius = {written(limit, 'mm')}",
-    )
-
-
-def _masses_apart(angles: tuple[float, float], arc: float, radius: float) -> Contradiction | None:
-    """The masses do not overlap at the start: |phi_1 - phi_2| >= l / r_b around the circle."""
-    apart, least = abs(math.remainder(angles[0] - angles[1], 2 * math.pi)), arc / radius
-    if apart >= least * (1 - _ROUNDING_FRACTION):
-        return None
-    width = written(least, "deg")
-    return Contradiction(
-        problem=f"the masses overlap: they are {written(apart, 'deg')} apart, each {width} wide",
-        allowed=f"angles at least arc_length / guide_radius = {width} apart",
-    )
-
-
 def _profile_in_order(profile: tuple[SpeedPoint, ...]) -> Contradiction | None:
     """The profile has a corner, and its times increase."""
     allowed = "at least one { time, speed }, in order of time, each time once"
@@ -393,16 +371,6 @@ def _step_is_multiple(step: float, base: float) -> Contradiction | None:
     return Contradiction(
         problem=f"it is not a whole multiple of the step of [sensor] ({first})",
         allowed=f"{first}, {second}, {third} ...",
-    )
-
-
-def _moves_in_order(stop: float, step: float) -> Contradiction | None:
-    """The smallest trial move is not longer than the first."""
-    if stop <= step:
-        return None
-    return Contradiction(
-        problem=f"the smallest trial move must not be longer than the first, step ({written(step, 'deg')})",
-        allowed=f"above 0 deg and at most {written(step, 'deg')}",
     )
 
 
@@ -432,10 +400,34 @@ _STEPS = ("imbalance_filter.step", "friction_filter.step", "lqr.step")
 CHECKS: tuple[Check, ...] = (
     check(_profile_in_order, "rotor.speed_profile"),
     check(_imbalance_in_rotor, "imbalance.mass", "rotor.mass"),
-    check(_masses_fit_track, _ARC, _GUIDE),
-    check(_masses_apart, "masses.initial_angle", _ARC, _GUIDE, moot=("masses_fit_track",)),
+    condition(
+        "masses_fit_track",
+        *(_ARC, _GUIDE),
+        more=lambda v: {"most": math.pi * v.guide_radius},
+        holds=lambda v: v.arc_length <= v.most * (1 + _ROUNDING_FRACTION),
+        problem="two masses of this length do not fit on the track",
+        allowed="above 0 mm and at most pi * guide_radius = {most:mm}",
+    ),
+    condition(
+        "masses_apart",
+        *("masses.initial_angle", _ARC, _GUIDE),
+        more=lambda v: {
+            "apart": abs(math.remainder(v.initial_angle[0] - v.initial_angle[1], 2 * math.pi)),
+            "width": v.arc_length / v.guide_radius,
+        },
+        holds=lambda v: v.apart >= v.width * (1 - _ROUNDING_FRACTION),
+        problem="the masses overlap: they are {apart:deg} apart, each {width:deg} wide",
+        allowed="angles at least arc_length / guide_radius = {width:deg} apart",
+        moot=("masses_fit_track",),
+    ),
     *(check(_step_is_multiple, step, "sensor.step") for step in _STEPS),
-    check(_moves_in_order, "fine_tuning.stop", "fine_tuning.step"),
+    condition(
+        "moves_in_order",
+        *("fine_tuning.stop", "fine_tuning.step"),
+        holds=lambda v: v.stop <= v.step,
+        problem="the smallest trial move must not be longer than the first, step ({step:deg})",
+        allowed="above 0 deg and at most {step:deg}",
+    ),
     limit_above_noise("supervisor.limit", "sensor.position_noise", "mm"),
     *_width_checks(),
 )

@@ -74,10 +74,10 @@ def test_plates_of_a_mesh_have_no_thickness(tmp_path: Path) -> None:
 def test_uncertain_dimensions_are_stated_as_ever(tmp_path: Path) -> None:
     scene_of(tmp_path)
     scene = edited(tmp_path, "[run]", '[uncertainty]\nouter_radius = "0.1 mm"\n[run]')
-    rows = {row.path: row for row in scene_table(scene)} if isinstance(scene, Scene) else {}
-    assert rows["disc.outer_radius"].uncertainty == "0.1 mm"
-    assert rows["disc.outer_radius"].origin == "derived"
-    assert rows["disc.geometry"].value == (
+    rows = {row["path"]: row for row in scene_table(scene)} if isinstance(scene, Scene) else {}
+    assert rows["disc.outer_radius"]["uncertainty"] == "0.1 mm"
+    assert rows["disc.outer_radius"]["origin"] == "derived"
+    assert rows["disc.geometry"]["value"] == (
         "chamber.msh: 72 tetra10 cells, outer_wall, inner_wall, plate_left, plate_right, end_back, end_front"
     )
 

@@ -18,9 +18,10 @@ from matplotlib.path import Path as Outline
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 from matplotlib.transforms import Bbox
 
-from ringbalance.design.axes import unit_of_path
+from ringbalance.design.axes import SweepAxis, unit_of_path
+from ringbalance.design.sensitivity import MIN_ROWS, shares_alone
 from ringbalance.design.static import BLOCKED, REFUSED
-from ringbalance.design.sweep import Sweep
+from ringbalance.design.sweep import Sweep, SweepColumn
 from ringbalance.reports.figure import (
     COLUMN_IN,
     FOUND,
@@ -80,9 +81,10 @@ _HATCHED: Final[dict[str, Any]] = {"facecolor": "none", "edgecolor": MUTED, "lin
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """Part of a sweep that its figures show."""
+    """Part of a sweep that the figure of a quantity shows."""
 
     sweep: Sweep
+    column: SweepColumn
     paths: tuple[str, ...]
     """Keys of one or two axes."""
     shown: BoolArray
@@ -95,6 +97,10 @@ class View:
         points = self.sweep.points
         return [np.array([p[path] for p in points], dtype=np.float64)[self.shown] for path in self.paths]
 
+    def values(self) -> FloatArray:
+        """Values of the quantity at the points shown, SI; NaN where not known."""
+        return np.asarray(self.column.array[self.shown], dtype=np.float64)
+
 
 def sweep_figures(sweep: Sweep, folder: Path) -> tuple[Path, ...]:
     """Write the figures of a sweep, each for the page's width and for a column of 85 mm, and a page on which
@@ -102,17 +108,18 @@ def sweep_figures(sweep: Sweep, folder: Path) -> tuple[Path, ...]:
 
     Returns: The files, the page last. Raises: OSError: they cannot be written.
     """
-    view, narrow = view_of(sweep), sweep_drawings(sweep, width=COLUMN_IN)
-    drawings = [*sweep_drawings(sweep), *narrow]
+    views = _views(sweep)
+    narrow = [_drawing(view, COLUMN_IN) for view in views]
+    drawings = [*(_drawing(view, None) for view in views), *narrow]
     texts = {f"{each.name}.svg": each.standalone() for each in drawings}
-    if view is not None and narrow:
-        texts[READING_FILE] = _page(view, narrow)
+    if views:
+        texts[READING_FILE] = _page(views, narrow)
     return tuple(write_whole(folder / name, text) for name, text in texts.items())
 
 
-def _page(view: View, drawings: list[Drawing]) -> str:
+def _page(views: list[View], drawings: list[Drawing]) -> str:
     """Page of figures in which a point is read out with all that is known of it."""
-    sweep, keys = view.sweep, view.keys()
+    view, sweep = views[0], views[0].sweep
     fields = {column.name: column for column in sweep.fields()}
     names = {"row": "row"}
     for axis in sweep.plan.axes:
@@ -126,11 +133,9 @@ def _page(view: View, drawings: list[Drawing]) -> str:
             unit = "" if any(isinstance(text, str) for text in texts) else fields[name].unit
             columns.append(ReadingColumn(name=words, values=texts, unit=unit))
     figures = []
-    for drawing in drawings:
-        (column,) = [name for name in COLUMNS if drawing.name.startswith(_stem(name))]
-        shown = np.array(fields[column].values, dtype=np.float64)[view.shown]
-        (x, y), words = [*keys, shown][:2], COLUMNS[column]
-        label = f"{words} over {' and '.join(map(axis_name, view.paths))}"
+    for each, drawing in zip(views, drawings, strict=True):
+        (x, y), words = [*each.keys(), each.values()][:2], COLUMNS[each.column.name]
+        label = f"{words} over {' and '.join(map(axis_name, each.paths))}"
         caption = f"{opening(words)}."
         figures.append(ReadableFigure(drawing=drawing, label=label, caption=caption, curves=[(x, y)]))
     best = np.flatnonzero(np.flatnonzero(view.shown) == sweep.best_or_nearest)
@@ -141,7 +146,7 @@ def _page(view: View, drawings: list[Drawing]) -> str:
         columns,
         figures,
         start=int(best[0]) if len(best) else 0,
-        along_x=len(keys) == 1,
+        along_x=len(view.paths) == 1,
         has_dark=False,
     )
 
@@ -153,43 +158,58 @@ def _stem(column: str) -> str:
 def sweep_drawings(sweep: Sweep, *, width: float | None = None) -> list[Drawing]:
     """A figure of each quantity over the keys that vary; none where a key takes texts.
 
-    A grid of more than two axes is drawn over the two with most values, with the others as in the best row.
+    A sample of more than two axes is drawn over the two with the largest shares of the quantity, a grid over
+    the two with most values (of as many, those with the largest shares of `Sweep.main_result`), with the
+    others as in the best row; the axes that vary first where shares are not known.
     Args: `width`: inches; None: the page's width.
     """
-    fields = {name: (unit, values) for name, unit, values in sweep.fields()}
-    view = view_of(sweep)
-    if view is None:
-        return []
-    return [
-        _drawing(view, name, *fields[name], width)
-        for name in COLUMNS
-        if name in fields and any(value is not None for value in np.array(fields[name][1])[view.shown])
-    ]
+    return [_drawing(view, width) for view in _views(sweep)]
 
 
-def view_of(sweep: Sweep) -> View | None:
-    """Axes and points to draw; None where no axis has numbers."""
-    numbers = [
+def _views(sweep: Sweep) -> list[View]:
+    """What the figure of each quantity shows; empty where no axis has numbers."""
+    axes = [
         axis
         for axis in sweep.plan.axes
         if not axis.names and all(isinstance(point.get(axis.head), int | float) for point in sweep.points)
     ]
-    shown = np.ones(len(sweep.points), dtype=np.bool_)
-    if not numbers:
-        return None
-    if sweep.plan.sample:
-        paths = tuple(axis.head for axis in numbers[:2])
-        return View(sweep=sweep, paths=paths, shown=shown, note="")
-    most = sorted(numbers, key=lambda axis: -len(axis.grid()))[:2]
-    axes = [axis for axis in sweep.plan.axes if axis in most]
+    fields = {column.name: column for column in sweep.fields()}
+    views = [_view(sweep, fields, name, axes) for name in COLUMNS if axes and name in fields]
+    return [view for view in views if np.isfinite(view.values()).any()]
+
+
+def _shares(sweep: Sweep, result: SweepColumn, axes: list[SweepAxis]) -> list[float]:
+    """Share of a result that each axis explains; zeros where not known."""
+    known = np.isfinite(result.array)
+    if np.count_nonzero(known) < MIN_ROWS:
+        return [0.0] * len(axes)
+    keys = np.array([[point[axis.head] for axis in axes] for point in sweep.points], dtype=np.float64)
+    return [*map(float, shares_alone(keys[known], result.array[known])[0])]
+
+
+def _view(sweep: Sweep, fields: dict[str, SweepColumn], name: str, axes: list[SweepAxis]) -> View:
+    sample = sweep.plan.sample
+    # All maps of a grid show the same points, so that one page can read them out.
+    decided = fields[name] if sample else fields.get(sweep.main_result, fields[name])
+    shares = _shares(sweep, decided, axes)
+    ranked = sorted(
+        (0 if sample else -len(axis.grid()), -share, i)
+        for i, (axis, share) in enumerate(zip(axes, shares, strict=True))
+    )
+    most = [axes[i] for *_, i in ranked[:2]]
+    paths = tuple(axis.head for axis in axes if axis in most)
+    shown, note = np.ones(len(sweep.points), dtype=np.bool_), ""
+    if sample:
+        return View(sweep=sweep, column=fields[name], paths=paths, shown=shown, note=note)
     row = sweep.best_or_nearest or 0
     others = [axis for axis in sweep.plan.axes if axis not in most and len(axis.grid()) > 1]
     for axis in others:
         values = [sweep.points[row].get(path) for path in axis.paths]
         shown &= [[point.get(path) for path in axis.paths] == values for point in sweep.points]
     held = ", ".join(sweep.axis_text(axis, row) for axis in others)
-    note = f"{held if len(held) <= _MAX_NOTE_CHARACTERS else 'other keys'} as in row {row}" if others else ""
-    return View(sweep=sweep, paths=tuple(axis.head for axis in axes), shown=shown, note=note)
+    if others:
+        note = f"{held if len(held) <= _MAX_NOTE_CHARACTERS else 'other keys'} as in row {row}"
+    return View(sweep=sweep, column=fields[name], paths=paths, shown=shown, note=note)
 
 
 def axis_name(path: str) -> str:
@@ -198,9 +218,9 @@ def axis_name(path: str) -> str:
     return input_name(path) if name == path or " " not in name else typeset(name)
 
 
-def _drawing(view: View, name: str, unit: str, values: list[Any], width: float | None) -> Drawing:
-    sweep, keys = view.sweep, view.keys()
-    shown = np.array([np.nan if value is None else value for value in values], dtype=np.float64)[view.shown]
+def _drawing(view: View, width: float | None) -> Drawing:
+    sweep, keys, shown = view.sweep, view.keys(), view.values()
+    name, unit = view.column.name, view.column.unit
     axes: list[AxisLabel] = [(axis_name(path), unit_of_path(sweep.scene, path)) for path in view.paths]
     feasible = np.array(sweep.feasible)[view.shown]
     best = np.flatnonzero(view.shown) == sweep.best_or_nearest

@@ -51,8 +51,8 @@ def first_order(inputs: FloatArray, result: FloatArray) -> tuple[FloatArray, Flo
     mixed = random.permutation(rows)
     x, y = inputs[mixed], result[mixed]
     halves = (np.sort(random.permutation(rows)[: rows // 2]) for _ in range(_HALVES))
-    spread = np.std([_shares(x[half], y[half])[0] for half in halves], axis=0)
-    shares, noise = _shares(x, y)
+    spread = np.std([shares_alone(x[half], y[half])[0] for half in halves], axis=0)
+    shares, noise = shares_alone(x, y)
     return shares, NORMAL_95 * spread + noise * (1 - shares)
 
 
@@ -68,8 +68,8 @@ def _varies(result: FloatArray) -> bool:
     return bool(result.size**2 > _CARRYING_ROWS * np.sum(squares**2))
 
 
-def _shares(inputs: FloatArray, result: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Shares, and the contribution of noise to each that is taken off."""
+def shares_alone(inputs: FloatArray, result: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """First-order shares of more than `_WAVES` rows, without intervals, and the noise taken off each."""
     rows, y = result.size, result - np.mean(result)
     parts = dct(y[np.argsort(inputs, axis=0, kind="stable")], axis=0)[1:] / rows
     # Half of the rows may have one value only, which nothing decides.

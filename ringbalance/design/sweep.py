@@ -248,10 +248,14 @@ class Sweep(Result):
         names = [column.name for column in self.fields() if column.name not in changed]
         return self._shares(names, total=total)
 
+    @property
+    def main_result(self) -> str:
+        """Column of the result that says how well a point serves."""
+        return "fraction" if self.runs else "reach"
+
     @cached_property
     def _main_shares(self) -> Shares:
-        """Sensitivity of the result by which the best point is chosen."""
-        return self._shares(["fraction" if self.runs else "reach"])
+        return self._shares([self.main_result])
 
     def _shares(self, names: Sequence[str], *, total: bool = False) -> Shares:
         if not self.plan.sample:
@@ -373,7 +377,7 @@ class Sweep(Result):
         if self._flows and any(width is not None for width in widths):
             yield Finding(code="sweep_intervals")
         if self.plan.sample and len(self.points) >= MIN_ROWS and not self._main_shares:
-            yield Finding(code="sweep_no_shares", values={"name": "fraction" if self.runs else "reach"})
+            yield Finding(code="sweep_no_shares", values={"name": self.main_result})
 
     def _change_text(self, row: int) -> str:
         return ", ".join(self.axis_text(axis, row) for axis in self.plan.axes)

@@ -143,6 +143,19 @@ def test_a_map_of_more_axes_shows_those_with_most_values(
     assert alone_map.tobytes() == full_map.tobytes()
 
 
+@pytest.mark.parametrize(("count", "sample"), [("", "sobol:64"), (":4", "")])
+def test_a_map_of_three_axes_is_over_those_that_decide(paper_scene: Scene, count: str, sample: str) -> None:
+    """The width decides the moment that is usable, and has no part in the velocity of a sample's map."""
+    vary = {"tube.bore": "1mm:2mm", "gas.pressure": "0.5MPa:0.8MPa", "disc.axial_width": "30mm:90mm"}
+    grid = {path: f"{text}{count}" for path, text in vary.items()}
+    sweep = rb.sweep(paper_scene, grid, sample=sample, intervals=False)
+    reach, velocity, _ = (each.standalone() for each in sweep_drawings(sweep))
+    assert any("width" in text for text in texts(reach))
+    assert any("width" in text for text in texts(velocity)) != bool(sample)
+    few = rb.sweep(paper_scene, vary, sample="sobol:16", intervals=False)
+    assert not any("width" in text for text in texts(sweep_drawings(few)[0].standalone()))
+
+
 def test_points_that_do_not_meet_show_their_values_too_and_the_nearest_is_marked(
     paper_scene: Scene, tmp_path: Path
 ) -> None:

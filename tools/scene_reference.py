@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from benchmark_tables import markdown
+
 from ringbalance.controller.eccentric_mass.scene_records import ECCENTRIC_MASS
 from ringbalance.scene import known_liquids
 from ringbalance.scene.keys.declaration import Entries, Key
@@ -15,7 +17,6 @@ from ringbalance.scene.units import DIMENSIONS
 WIDTHS = "uncertainty"
 MANY = 8
 """Largest number of units of a quantity that are listed one by one."""
-HEAD = "| key | takes | when left out | meaning |\n|---|---|---|---|"
 
 
 def key_reference(schema: Schema, title: str, above: Schema | None = None) -> str:
@@ -26,19 +27,19 @@ def key_reference(schema: Schema, title: str, above: Schema | None = None) -> st
     """
     tables = {} if above is None else above.tables
     same = [name for name in schema.tables if name in tables and _told(schema, name) == _told(above, name)]
-    parts = [f"### {title}", *rows(schema.top)]
+    parts = [f"### {title}", keys_table(schema.top)]
     for name, table in schema.tables.items():
         if name in same:
             continue
-        inside = widths(schema) if name == WIDTHS else rows(table.keys)
-        parts += [f"\n### [{name}]", f"{table.text[0].upper()}{table.text[1:]}.\n", *inside]
+        inside = widths(schema) if name == WIDTHS else keys_table(table.keys)
+        parts += [f"\n### [{name}]", f"{table.text[0].upper()}{table.text[1:]}.\n", inside]
     for name, table in schema.tables.items():
         if name == WIDTHS or name in same:
             continue
         for key, declared in table.keys.items():
             if isinstance(declared.takes, Entries) and key != ORIGIN:
                 each = ", each entry" if declared.takes.example else ""
-                parts += [f"\n### [{name}] {key}{each}", *rows(declared.takes.keys)]
+                parts += [f"\n### [{name}] {key}{each}", keys_table(declared.takes.keys)]
     if same:
         parts += [f"\n### [{'], ['.join(same)}]", "As of a liquid-ring scene, above."]
     return "\n".join(parts)
@@ -49,12 +50,12 @@ def _told(schema: Schema | None, name: str) -> object:
     if schema is None or name == WIDTHS:
         return schema
     table = schema.tables[name]
-    inside = [rows(key.takes.keys) for key in table.keys.values() if isinstance(key.takes, Entries)]
-    return table.text[0], rows(table.keys), inside
+    inside = [keys_table(key.takes.keys) for key in table.keys.values() if isinstance(key.takes, Entries)]
+    return table.text[0], keys_table(table.keys), inside
 
 
-def widths(schema: Schema) -> list[str]:
-    """Lines of the table [uncertainty], whose keys all take the same values."""
+def widths(schema: Schema) -> str:
+    """Text on the table [uncertainty], whose keys all take the same values."""
     variants = {
         name: [key for key, declared in table.keys.items() if declared.uncertain]
         for name, table in schema.tables.items()
@@ -65,25 +66,20 @@ def widths(schema: Schema) -> list[str]:
         if isinstance(first.takes, Entries)
         else ("a key for each of these quantities", ", or that of the liquid")
     )
-    return [
-        f"It has {how}: a percentage, or a value with its unit. Left out: exact{liquid}.\n",
-        "| of table | quantities |\n|---|---|",
-        *(f"| [{name}] | `{'`, `'.join(keys)}` |" for name, keys in variants.items() if keys),
-    ]
+    rows = [(f"[{name}]", f"`{'`, `'.join(keys)}`") for name, keys in variants.items() if keys]
+    text = f"It has {how}: a percentage, or a value with its unit. Left out: exact{liquid}."
+    return f"{text}\n\n{markdown(('of table', 'quantities'), rows)}"
 
 
 def liquid_reference() -> str:
     """Write a Markdown table of the known liquids."""
-    head = (
-        "| name | also understood | temperatures | density, 95 % | viscosity, 95 % | source |\n"
-        "|---|---|---|---|---|---|"
-    )
-    rows = (
-        f"| {each.name} | {', '.join(each.aliases)} | {each.held} | {100 * each.density_uncertainty:g} % "
-        f"| {100 * each.viscosity_uncertainty:g} % | {each.source} |"
-        for each in known_liquids()
-    )
-    return "\n".join([head, *rows])
+    heads = ("name", "also understood", "temperatures", "density, 95 %", "viscosity, 95 %", "source")
+    rows = []
+    for each in known_liquids():
+        spreads = (each.density_uncertainty, each.viscosity_uncertainty)
+        cells = (each.name, ", ".join(each.aliases), each.held, *(f"{100 * share:g} %" for share in spreads))
+        rows.append((*cells, each.source))
+    return markdown(heads, rows)
 
 
 def valve_reference() -> str:
@@ -95,14 +91,13 @@ def valve_reference() -> str:
         pressures = " to ".join(filter(None, (row["lowest_pressure"], row["highest_pressure"])))
         source = ", ".join(filter(None, (row["source"], row["date"])))
         rows.append((row["name"], row["type"], *(row[each] for each in columns), pressures, source))
-    lines = (f"| {' | '.join(cells)} |" for cells in (("name", "type", *heads), ("---",) * 9, *rows))
-    return "\n".join(lines)
+    return markdown(("name", "type", *heads), rows)
 
 
 def unit_reference() -> str:
     """Write a Markdown table of the units."""
-    rows = (f"| {kind.noun} | `{kind.example}` | {_units([*kind.units])} |" for kind in DIMENSIONS.values())
-    return "\n".join(["| quantity | example | units |\n|---|---|---|", *rows])
+    rows = [(kind.noun, f"`{kind.example}`", _units([*kind.units])) for kind in DIMENSIONS.values()]
+    return markdown(("quantity", "example", "units"), rows)
 
 
 def _units(names: list[str]) -> str:
@@ -116,23 +111,15 @@ def _units(names: list[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
 
 
-def rows(keys: Mapping[str, Key]) -> list[str]:
-    """Head and rows of the table of some keys, without `origin`, which the text of the page describes."""
-    return [
-        HEAD,
-        *(
-            f"| `{name}` | {key.takes.summary} | {when_left_out(key)} | {key.presence.meaning} |"
-            for name, key in keys.items()
-            if name != ORIGIN
-        ),
-    ]
-
-
-def when_left_out(key: Key) -> str:
-    """Default of a key, in words."""
-    if key.presence.kind == "standard":
-        return f"`{toml_text(key.presence.default)}`"
-    return key.presence.otherwise
+def keys_table(keys: Mapping[str, Key]) -> str:
+    """Table of some keys, without `origin`, which the text of the page describes."""
+    rows = []
+    for name, key in keys.items():
+        how = key.presence
+        absent = f"`{toml_text(how.default)}`" if how.kind == "standard" else how.otherwise
+        if name != ORIGIN:
+            rows.append((f"`{name}`", key.takes.summary, absent, how.meaning))
+    return markdown(("key", "takes", "when left out", "meaning"), rows)
 
 
 def tables() -> dict[str, str]:

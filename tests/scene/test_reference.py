@@ -44,7 +44,7 @@ def test_every_key_has_a_meaning(schema: Schema, inside_lists: int) -> None:
 
 @pytest.mark.parametrize("schema", [LIQUID_RING, ECCENTRIC_MASS])
 def test_every_uncertain_quantity_is_listed(schema: Schema) -> None:
-    told = "\n".join(scene_reference.widths(schema))
+    told = scene_reference.widths(schema)
     for name, table in schema.tables.items():
         keys = [f"`{key}`" for key, declared in table.keys.items() if declared.uncertain]
         assert not keys or f"| [{name}] | {', '.join(keys)} |" in told

@@ -116,9 +116,13 @@ class Quantity:
 
 
 def around(value: float, total: float | None, *, stated: bool = True) -> tuple[float | None, float | None]:
-    """Ends of a symmetric 95 % interval; (None, None) where `believed` gives no uncertainty."""
+    """Ends of a symmetric 95 % interval, cut at zero where the value is not negative, as no size, time,
+    pressure or moment is; (None, None) where `believed` gives no uncertainty.
+    """
     width = believed(value, total, stated=stated)
-    return (value - width, value + width) if width else (None, None)
+    if not width:
+        return None, None
+    return max(value - width, 0.0 if value >= 0 else -math.inf), value + width
 
 
 Severity = Literal["info", "warning", "error"]

@@ -139,6 +139,9 @@ def test_parts_add_as_squares() -> None:
     total = Parts(numerical=1.0, input=2.0, model=2.0).total
     assert total == 3.0
     assert around(5.0, total) == (2.0, 8.0)
+    assert around(2.0, total) == (0.0, 5.0)
+    assert around(0.0, total) == (0.0, 3.0)
+    assert around(-2.0, total) == (-5.0, 1.0)
     assert around(5.0, 0.0) == (None, None)
     assert around(10.75625, 5.7e-14) == (None, None)
     assert around(10.75625, 1e-3, stated=False) == (None, None)

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_document
+from ringbalance.controller.liquid_ring import balancer
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.terms import run_models
 from ringbalance.reduced_model.calibration import calibrate
@@ -104,3 +105,19 @@ def test_a_line_that_is_not_given_is_run_at_both_ends(scene: Scene, calibrated: 
     assert line_runs(simulate(given, calibrated)) == {}
     # The fast end is the run of a scene that gives that line.
     assert simulate(given, calibrated).amplitude[-1] == fast.amplitude[-1]
+
+
+def test_one_verdict_where_an_end_of_the_default_range_ends_otherwise(
+    scene: Scene, calibrated: BalancerModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = simulate(scene, calibrated)
+    limited = simulate(with_tables(scene, run={"time_limit": 1.0}), calibrated)
+    assert run.settled
+    assert not limited.settled
+    for slow, codes in ((limited, ["valve_decides"]), (run, ["settled"])):
+        monkeypatch.setattr(balancer, "line_runs", lambda _, slow=slow: {"slow": slow, "fast": run})
+        findings = balancer.LiquidRingBalancer(scene).rows(run).findings
+        assert [each.code for each in findings if "settled" in each.text] == codes
+        if slow is limited:
+            for each in (run, slow):
+                assert each.findings[0].text in findings[0].text

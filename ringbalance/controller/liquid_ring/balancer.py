@@ -339,9 +339,17 @@ class LiquidRingBalancer(Balancer):
         return calibrate(self.scene).rows().quantities
 
     def rows(self, run: Simulation) -> Rows:
-        """Rows of a run, with its results at both ends of the default range of an unstated gas line."""
-        rows = run.rows()
-        return replace(rows, tables=(line_runs_table(line_runs(run)), *rows.tables))
+        """Rows of a run, with its results at both ends of the default range of an unstated gas line.
+
+        Where these settle and the run does not, or the reverse, the verdict is that this is undecided.
+        """
+        rows, runs = run.rows(), line_runs(run)
+        first, *others = rows.findings
+        if any(each.settled != run.settled for each in runs.values()):
+            ends = "; ".join(f"with the {end} line {each.findings[0].text}" for end, each in runs.items())
+            first = Finding(code="valve_decides", values={"at_once": first.text, "ends": ends})
+        tables = (line_runs_table(runs), *rows.tables)
+        return replace(rows, findings=(first, *others), tables=tables)
 
     def history(self, run: Simulation) -> Mapping[str, Sequence[Any]]:
         return simulation_history(run)

@@ -7,12 +7,13 @@ from collections.abc import Iterator
 from typing import Final
 
 from ringbalance.controller.balancer import WATCH_TIME_S
-from ringbalance.controller.liquid_ring.loop_factor import default_gain, small_margin
+from ringbalance.controller.liquid_ring.loop_factor import default_gain, short_period, small_margin
 from ringbalance.controller.liquid_ring.plant import (
     LEAST_PRESSURE_PA,
     NEARLY_EMPTY,
     starting_pressure,
 )
+from ringbalance.controller.loop_records import NOTICEABLE_CHANGE
 from ringbalance.controller.rotor import assumed_rotor
 from ringbalance.controller.simulation import NOISE_DEVIATIONS, Outcome, Simulation
 from ringbalance.controller.terms import dead_time
@@ -134,12 +135,16 @@ def _causes(run: Simulation) -> Iterator[Finding]:
             yield Finding(code="gain_too_high", values={**values, "proportional": highest})
     if outcome is Outcome.STALLED and run.unreachable_amplitude > scene.controller.limit:
         yield Finding(code="unbalance_beyond_gas", values=_moments(run))
+    ran_back = run.state["drift"] > NOTICEABLE_CHANGE and not run.settled
+    short = tuple(short_period(scene, run.plant.model)) if ran_back else ()
     if outcome is Outcome.DRIFTING:
         total = 2 * scene.disc.initial_fill
         fill = total - min(run.plant.residual_fill, total / 2)
         held = Holding.of(scene, fill_ratio=fill)
         lost = None if held.likely_speed is not None else held.finding
-        yield lost or Finding(code="tube_runs_back")
+        if lost or not short:
+            yield lost or Finding(code="tube_runs_back")
+    yield from short
     if outcome in _BY_SETTINGS:
         foreign = run.controller != scene.controller.kind
         code = "own_overshoots" if foreign else "overshoots"

@@ -120,6 +120,18 @@ def check_fit(scene: Scene, model: BalancerModel) -> None:
         raise SceneError(faults)
 
 
+def least_period(scene: Scene, model: BalancerModel) -> float:
+    """Wait, s, in which an injection dies out, at equal fills: lag and time to vent a chamber.
+
+    After a shorter one gas of the injection before still pushes as the next begins, and liquid runs back.
+    """
+    line, lag = GasLine.of(scene.gas), scene.gas.valve_lag or 0.0
+    if line is None:
+        return lag
+    volume = (1.0 - scene.disc.initial_fill) * model.chamber_volume + (scene.gas.dead_volume or 0.0)
+    return lag + float(line.venting_time(line.supply_pressure, volume=volume))
+
+
 def dead_time(scene: Scene, model: BalancerModel, *, rate: float) -> float:
     """Dead time, s, at equal fills of an injection that corrects an amplitude at the limit.
 

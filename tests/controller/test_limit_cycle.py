@@ -10,7 +10,9 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.loop_records import NOTICEABLE_CHANGE
 from ringbalance.controller.simulation import Outcome, Simulation
+from ringbalance.controller.terms import least_period
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
 from ringbalance.scene.models import Scene
@@ -40,6 +42,23 @@ def drawn(name: str, seed: int, *, offset: float) -> Simulation:
     }
     run = {"seed": seed, "time_limit": 60.0}
     return simulate(with_tables(scene, controller=settings, run=run), model, modelled=[])
+
+
+@pytest.mark.parametrize("offset", [0.06, 0.12, 0.2])
+@pytest.mark.parametrize("name", ["spindle_design", "imported_chamber"])
+def test_a_period_in_which_an_injection_does_not_die_out_is_named(name: str, offset: float) -> None:
+    """With at least the wait that is named no liquid runs back; the crest holds it at any period."""
+    scene, model = machine(name)
+    line = {"conductance": 0.3e-8, "critical_ratio": 0.3, "valve_lag": 3e-3}
+    held = {"gas_time_offset": (offset,), "hold_time": 5.0}
+    least = least_period(with_tables(scene, gas=line), model)
+    for part, runs_back in ((0.1, True), (1.0, False)):
+        settings = {**held, "period": part * least}
+        run = simulate(with_tables(scene, gas=line, controller=settings), model)
+        assert (run.state["drift"] > NOTICEABLE_CHANGE) == runs_back
+        short = [each.values for each in run.findings if each.code == "period_too_short"]
+        assert short == ([{"period": settings["period"], "least": least}] if runs_back else [])
+        assert "tube_runs_back" not in {each.code for each in run.findings}
 
 
 def test_corrections_for_ever_are_a_limit_cycle_and_not_a_lack_of_time() -> None:

@@ -40,11 +40,11 @@ from ringbalance.controller.liquid_ring.capacity import beyond_capacity
 from ringbalance.controller.liquid_ring.devices import Spread, rotor_like
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
 from ringbalance.controller.liquid_ring.drying import part_per_gas
-from ringbalance.controller.liquid_ring.loop_factor import loop_information
+from ringbalance.controller.liquid_ring.loop_factor import loop_information, short_period
 from ringbalance.controller.liquid_ring.offers import drawn_input, remedies_of, trials, valves_of
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import CommonRotor, Rotors, Sensor, wrapped
-from ringbalance.controller.simulation import Simulation
+from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.trials import DrawnInput, Information, Trials
 from ringbalance.reduced_model.calibration import calibrate, calibrated_model, chamber_and_law, law_by_name
@@ -332,8 +332,10 @@ class LiquidRingBalancer(Balancer):
         return replace(loop, document={**loop.document, "drawn": document, "consumption": consumption})
 
     def beyond_capacity(self, scene: SceneFile, ended: Sequence[str], settings: str) -> tuple[Finding, ...]:
-        """Findings on liquid that a machine moves beyond the fills at which runs end."""
-        return tuple(beyond_capacity(liquid_ring_scene(scene), self.model, ended, settings=settings))
+        """Findings on liquid that a machine moves beyond the fills at which runs end, on a short period."""
+        ring = liquid_ring_scene(scene)
+        short = short_period(ring, self.model) if Outcome.DRIFTING.value in ended else ()
+        return (*beyond_capacity(ring, self.model, ended, settings=settings), *short)
 
     def quantities(self) -> tuple[Quantity, ...]:
         return calibrate(self.scene).rows().quantities

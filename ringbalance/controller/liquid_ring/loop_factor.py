@@ -32,7 +32,7 @@ from ringbalance.controller.algorithms.law_steps import (
     split,
 )
 from ringbalance.controller.rotor import chamber_directions
-from ringbalance.controller.terms import run_models
+from ringbalance.controller.terms import least_period, run_models
 from ringbalance.controller.trials import Information
 from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model.crater import jet_text
@@ -127,6 +127,13 @@ def default_gain(scene: Scene) -> Iterator[Finding]:
     """Finding that a loop is judged by a gain that its scene does not give."""
     if scene.origin_of("controller.proportional") == "default":
         yield Finding(code="default_gain", values={"proportional": scene.controller.proportional})
+
+
+def short_period(scene: Scene, model: BalancerModel) -> Iterator[Finding]:
+    """Finding that the next sample is taken before an injection is over."""
+    period, least = scene.controller.period, least_period(scene, model)
+    if period < least:
+        yield Finding(code="period_too_short", values={"period": period, "least": least})
 
 
 def small_margin(scene: Scene, margins: Margins | None) -> Iterator[Finding]:

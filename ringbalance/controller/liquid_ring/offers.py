@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from ringbalance.controller.balancer import Remedy
 from ringbalance.controller.liquid_ring.loop_factor import loop_rate
-from ringbalance.controller.terms import dead_time
+from ringbalance.controller.terms import dead_time, least_period
 from ringbalance.controller.trials import MEASURE_INPUT, DrawnInput, Point, SearchAxis, Trials, rounded
 from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -181,7 +181,10 @@ def remedies_of(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
         if changes:
             yield Remedy(code="faster_valve", changes=changes)
     yield from _of_jet(scene)
-    yield Remedy(code="period", changes={"controller.period": scene.controller.period / 2})
+    period, least = scene.controller.period, least_period(scene, model)
+    yield Remedy(
+        code="period", changes={"controller.period": rounded(least) if period < least else period / 2}
+    )
     # Higher limits would miss a residual that the scene requires.
     if scene.requirement.residual is None and scene.requirement.grade is None:
         for factor in _LIMITS:

@@ -104,7 +104,7 @@ def test_doctor_lists_it_and_what_cannot_be_used(tmp_path: Path) -> None:
 def test_check_balancer_passes(beside: Path) -> None:
     code, text = ended(beside, "check-balancer ball")
     assert code == 0
-    assert text.startswith("the balancer ball passes all 17 checks")
+    assert text.startswith("the balancer ball passes all 18 checks")
 
 
 @pytest.mark.parametrize(

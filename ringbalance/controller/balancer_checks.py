@@ -20,6 +20,8 @@ from ringbalance.scene.units import DIMENSIONS
 
 _UNITS: Final = {unit for kind in DIMENSIONS.values() for unit in kind.units} | {"1"}
 _SPAN_S: Final = 7.5
+_ANGLES: Final = (0.0, math.pi / 8, math.pi / 4, 3 * math.pi / 8)
+"""Directions of the unbalance, from the scene's: one is near the worst of a disc of four chambers or more."""
 Check = Callable[[Balancer], Iterator[str]]
 """Function that yields what is wrong; its docstring says what must hold."""
 
@@ -144,6 +146,30 @@ def rotor(balancer: Balancer) -> Iterator[str]:
             yield f"{name} is {after} in place of {before}"
 
 
+def reach(balancer: Balancer) -> Iterator[str]:
+    """Runs cancel nine tenths of the stated reach in any direction, and no more than it in the worst."""
+    stated = next((each.value for each in balancer.quantities() if each.key == "reach"), None)
+    if stated is None or not 0 < stated < math.inf:
+        yield f"the quantity reach is {stated}"
+        return
+    common = balancer.rotor()
+    small = common.limit / abs(common.influence)
+
+    def left(size: float) -> list[float]:
+        phases = (cmath.phase(common.unbalance) + angle for angle in _ANGLES)
+        turned = (replace(common, unbalance=cmath.rect(size, phase)) for phase in phases)
+        runs = (balancer.on_rotor(each).run({}, AS_GIVEN) for each in turned)
+        return [float(run.final_amplitude[0]) / abs(common.influence) for run in runs]
+
+    if (most := max(left(0.9 * stated))) > small:
+        after = f"after {balancer.span():.3g} s"
+        yield f"of 0.9 of a reach of {stated:.4g} kg m runs leave {most:.3g} kg m {after}"
+    # That of the scene, which the balancer is for, and one beyond reach by more than the limit leaves.
+    sizes = {abs(common.unbalance), 2 * stated + 2 * small}
+    if (cancelled := max(size - max(left(size)) for size in sizes)) > 1.1 * stated:
+        yield f"the reach is {stated:.4g} kg m, and runs cancel {cancelled:.3g} kg m in any direction"
+
+
 def span(balancer: Balancer) -> Iterator[str]:
     """Runs last as long as is asked for."""
     if not math.isclose(reached := balancer.lasting(_SPAN_S).span(), _SPAN_S):
@@ -194,6 +220,7 @@ CHECKS: Final[tuple[Check, ...]] = (
     traces,
     untraced,
     rotor,
+    reach,
     span,
     pickles,
     options,

@@ -19,7 +19,14 @@ from own_balancers import EXAMPLE
 import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.balancer import Balancer, Outcomes, balancer_of
-from ringbalance.controller.balancer_checks import CHECKS, Check, checked_scene, description, problems_of
+from ringbalance.controller.balancer_checks import (
+    CHECKS,
+    Check,
+    checked_scene,
+    description,
+    problems_of,
+    reach,
+)
 from ringbalance.controller.compare import compare
 from ringbalance.identification.reading import template
 from ringbalance.scene import registry
@@ -41,8 +48,8 @@ def balancer(request: pytest.FixtureRequest, balls: BallScene) -> Balancer:
     if request.param == "ball":
         return balancer_of(balls)
     name, seconds = {
-        "liquid_ring": ("six_chamber", 4.0),
-        "eccentric_mass": ("driven_masses_small", 3.0),
+        "liquid_ring": ("six_chamber", 15.0),
+        "eccentric_mass": ("driven_masses_small", 10.0),
     }[request.param]
     return balancer_of(load_scene(bundled_scene(name)).with_values({"run.time_limit": seconds}))
 
@@ -70,6 +77,7 @@ def _nothing(self: BallBalancer, *_: Any, **__: Any) -> tuple[Any, ...]:
     return ()
 
 
+TRUE_REACH = BallBalancer.reach
 MUTATIONS: dict[str, dict[str, Any]] = {
     "inputs": {"inputs": _nothing},
     "settings": {"settings": _nothing},
@@ -97,6 +105,7 @@ MUTATIONS: dict[str, dict[str, Any]] = {
             self.scene.with_values({"rotor.phase": "3 deg"})
         )
     },
+    "reach": {"reach": lambda self, device: 0.01 * TRUE_REACH(self, device)},
     "span": {"lasting": lambda self, span: self},
     "pickles": {"__reduce__": lambda self: (type(self), (self.scene.with_values({"run.seed": 9}),))},
     "options": {"options": frozenset(["colour"])},
@@ -119,6 +128,24 @@ def test_every_check_notices_its_error(balls: BallScene, name: str, monkeypatch:
     assert problems_of(check, Wrong(balls)) != ()
 
 
+@pytest.mark.parametrize(
+    ("factor", "said"),
+    [(0.01, "runs cancel"), (0.8, "runs cancel"), (1.0, ""), (1.3, "of 0.9 of a reach of")],
+)
+def test_a_false_reach_is_told_from_the_runs(
+    balls: BallScene, factor: float, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(BallBalancer, "reach", lambda self, device: factor * TRUE_REACH(self, device))
+    problems = problems_of(reach, BallBalancer(balls))
+    assert len(problems) == bool(said)
+    assert said in " ".join(problems)
+
+
+@pytest.mark.parametrize("scene", ["liquid_ring_paper", "six_chamber", "driven_masses_small"])
+def test_the_reach_of_the_programs_own_balancers_is_what_their_runs_cancel(scene: str) -> None:
+    assert problems_of(reach, balancer_of(load_scene(bundled_scene(scene)))) == ()
+
+
 def test_the_checks_of_the_last_two_notice_scenes_that_nobody_checks(
     balls: BallScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -132,7 +159,7 @@ def test_the_command_prints_every_check(capsys: pytest.CaptureFixture[str]) -> N
     assert main(["check-balancer", "ball", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["passed"]
-    assert len(document["checks"]) == len(CHECKS) == 17
+    assert len(document["checks"]) == len(CHECKS) == 18
     assert main(["check-balancer", "liquid_ring"]) == 2
     assert "its package brings no example; allowed: --scene SCENE with it" in capsys.readouterr().err
     assert main(["check-balancer", "ball", "--scene", "six_chamber"]) == 2
@@ -145,7 +172,7 @@ def test_a_failed_check_is_said_with_its_reason(
     monkeypatch.setattr(BallBalancer, "lasting", lambda self, span: self)
     assert main(["check-balancer", "ball"]) == 1
     text = " ".join(capsys.readouterr().out.split())
-    assert "the balancer ball fails 1 of 17 checks" in text
+    assert "the balancer ball fails 1 of 18 checks" in text
     assert "20.0 s in place of 7.5 s" in text
 
 

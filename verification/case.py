@@ -14,11 +14,12 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal
 
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.typed_record import Condition, record_from
 from ringbalance.verification.standing import SUBJECTS
-from ringbalance.verification.typed_record import Pattern, RecordError, record_from
 from ringbalance.verification.verdicts import VOCABULARY, Kind, Metric, Role, Verdict
 
-Text = Annotated[str, Pattern(r".{3,}", "a text of three characters or more")]
+Text = Annotated[str, Condition.text(r".{3,}", "a text of three characters or more")]
 CAUSES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "": "",
@@ -38,7 +39,7 @@ CAUSES: Final[Mapping[str, str]] = MappingProxyType(
 )
 """Common causes of a claim's departure, as readers see them."""
 Identifier = Annotated[
-    str, Pattern(r"[a-z][a-z0-9_]*", "small letters, digits and underscores, first a letter")
+    str, Condition.text(r"[a-z][a-z0-9_]*", "small letters, digits and underscores, first a letter")
 ]
 Basis = Literal["total", "per unit depth", "pointwise", "ratio", "count", "time"]
 _ReferenceKind = Literal[
@@ -96,7 +97,7 @@ class _ReferenceText:
 class RestsOn:
     """An input that decides a claim, by its scene path; varied over its range unless given or measured."""
 
-    path: Annotated[str, Pattern(r"[a-z_]+\.[a-z_]+", "table.key")]
+    path: Annotated[str, Condition.text(r"[a-z_]+\.[a-z_]+", "table.key")]
     low: float | None = None
     """Smallest and largest value, SI, where this claim has its own reason for them."""
     high: float | None = None
@@ -131,7 +132,7 @@ class JudgedQuantity:
 
     name: Identifier
     title: Text
-    unit: Annotated[str, Pattern(r".+", 'a unit, or "1"')]
+    unit: Annotated[str, Condition.text(r".+", 'a unit, or "1"')]
     basis: Basis
     metric: Metric
     limit: float
@@ -160,7 +161,7 @@ class Mutation:
 class _Study:
     """Function of the program that computes a case."""
 
-    of: Annotated[str, Pattern(r"[a-z0-9_]+(\.[a-z0-9_]+){2,}", "folder.module.function")]
+    of: Annotated[str, Condition.text(r"[a-z0-9_]+(\.[a-z0-9_]+){2,}", "folder.module.function")]
     settings: Mapping[str, Any] = field(default_factory=dict)
     """Further arguments by name, where several cases share it."""
 
@@ -214,11 +215,11 @@ class CaseDefinition:
     def parse(cls, text: str, *, source: str) -> CaseDefinition:
         """Read a case.toml. Raises: CaseError: not TOML, or not a case, with all errors at once."""
         try:
-            return record_from(CaseDefinition, tomllib.loads(text))
+            return record_from(CaseDefinition, tomllib.loads(text), file=source)
         except tomllib.TOMLDecodeError as error:
             raise CaseError(f"{source}: {error}") from error
-        except RecordError as error:
-            raise CaseError("\n".join(f"{source}: {each}" for each in error.errors)) from error
+        except SceneError as error:
+            raise CaseError(str(error)) from error
 
     @property
     def prose(self) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from typing import Any, Final, Self
 from ringbalance.results.numbers import format_given, percent
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity
+from ringbalance.scene.typed_record import plain
 from ringbalance.verification.assumptions import Assumption
 from ringbalance.verification.case import (
     CAUSES,
@@ -27,7 +28,6 @@ from ringbalance.verification.evidence import (
     Level,
     from_range,
 )
-from ringbalance.verification.typed_record import plain
 from ringbalance.verification.verdicts import Kind, Verdict, judge_quantity
 
 Document = dict[str, Any]

@@ -13,7 +13,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
-from ringbalance.verification.typed_record import record_from
+from ringbalance.scene.typed_record import record_from
 
 HEADS: Final = (
     "Quantity",
@@ -42,7 +42,7 @@ class _Subject:
 
 SUBJECTS: Final[Mapping[str, _Subject]] = MappingProxyType(
     {
-        name: record_from(_Subject, table)
+        name: record_from(_Subject, table, file="standing.toml")
         for name, table in tomllib.loads(
             (files("ringbalance.verification") / "standing.toml").read_text(encoding="utf-8")
         ).items()

@@ -30,6 +30,7 @@ from ringbalance.reduced_model.tube.regime import CLEARING, TubeEnds, TubePath, 
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ringbalance.scene.models import HumpGas
 from ringbalance.scene.registry import registered
+from ringbalance.scene.typed_record import NotNegative, Positive
 
 WIDTH: Final = 3
 """Column of `CalibratedMoment.along` that holds the expanded uncertainty of U."""
@@ -83,13 +84,13 @@ class CalibratedLaw:
 
     name: str
     """ "calibrated"."""
-    max_fill_ratio: float
+    max_fill_ratio: Positive
     """Liquid of the pair as a fraction of one chamber's volume."""
-    ambient_pressure: float
+    ambient_pressure: NotNegative
     """Absolute, Pa."""
-    chamber_volume: float
+    chamber_volume: Positive
     """V, m^3."""
-    tube_area: float
+    tube_area: Positive
     """S, m^2."""
     levels: Table
     """Table over the fill ratio of `hydrostatic_pressure`, Pa, with slope and curvature."""
@@ -99,7 +100,7 @@ class CalibratedLaw:
     """Loss of the tube."""
     moment: CalibratedMoment
     """Moment of a pair that goes with this law."""
-    gas_factor: float = 1.0
+    gas_factor: Positive = 1.0
     """Gas pressure on the liquid over that at the point of measurement; all arguments are the latter."""
 
     half_widths: HalfWidths | None = None

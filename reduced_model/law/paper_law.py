@@ -24,6 +24,7 @@ from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
+from ringbalance.scene.typed_record import NotNegative, Positive
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,9 +37,9 @@ class PaperMoment:
 
     moment_per_transferred_mass: float
     """lambda, m."""
-    density: float
+    density: Positive
     """rho, kg/m^3."""
-    chamber_volume: float
+    chamber_volume: Positive
     """V, m^3."""
 
     def pair_moment(self, *, fill_ratio: npt.ArrayLike, opposite_fill_ratio: npt.ArrayLike) -> FloatArray:
@@ -64,23 +65,23 @@ class PaperLaw:
     rho omega^2 V/(B theta), Pa: u^2 = the first times (p0 + the second times (x_A - x_C)).
     """
 
-    density: float
+    density: Positive
     """rho, kg/m^3."""
     angular_velocity: float
     """omega, rad/s."""
-    axial_width: float
+    axial_width: Positive
     """B, m."""
-    central_angle: float
+    central_angle: Positive
     """theta, rad."""
-    chamber_volume: float
+    chamber_volume: Positive
     """V of Eq. 4, m^3."""
-    tube_area: float
+    tube_area: Positive
     """S, m^2."""
-    drag_coefficient: float
+    drag_coefficient: NotNegative
     """k."""
-    max_fill_ratio: float
+    max_fill_ratio: Positive
     """Liquid of the pair as a fraction of one chamber's volume; 0.5 in the paper."""
-    ambient_pressure: float
+    ambient_pressure: NotNegative
     """Absolute, Pa."""
     moment: PaperMoment
     """Moment of a pair that goes with this law."""

@@ -18,6 +18,7 @@ from ringbalance.scene.designs import Designs
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.toml import toml_text
+from ringbalance.scene.typed_record import NotNegative
 
 TABLE_VELOCITIES: Final = (1e-5, 1e3)
 """Range of the tables, m/s: below, the flow creeps and the head is proportional to u; above, to u^2."""
@@ -55,7 +56,7 @@ class TubeHeads:
     of the crest's arc or just behind it: u/sqrt(head); None without a crest."""
     return_hump: Table | None
     """Table as `hump` from the opposite chamber, for reverse flow; None: an equal one, or no crest."""
-    interpolation_error: float = 0.0
+    interpolation_error: NotNegative = 0.0
     """Largest relative error of a head between knots; zero where it was not checked."""
 
     @classmethod

@@ -18,6 +18,7 @@ import numpy as np
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, plain
 from ringbalance.scene.platform.both_ways import both_ways, chosen
+from ringbalance.scene.typed_record import NotNegative, Positive
 
 CLEARING: Final = (0.6, 1.1)
 """Froude numbers u/sqrt(g_c d), g_c = omega^2 r_m, below which gas stays over the crest, and above which the
@@ -71,7 +72,7 @@ class TubeEnds(NamedTuple):
 class TubePath:
     """The tube's fixed radii, as pressures of a column that reaches from there to the outer wall."""
 
-    density: float
+    density: Positive
     """rho, kg/m^3."""
     port_pressure: float
     """D_p = rho omega^2 (R2^2 - r_p^2)/2, Pa."""
@@ -82,10 +83,10 @@ class TubePath:
     """True if the gas over the siphon crest must be displaced through the downstream port."""
     vapour_pressure: float
     """Gauge, Pa."""
-    released: float
+    released: NotNegative
     """Position of the cavity's pressure from the vapour pressure, 0, to the downstream gas, 1;
     `RELEASED` with dissolved gas."""
-    froude_velocity: float
+    froude_velocity: NotNegative
     """sqrt(g_c d) = sqrt(omega^2 r_m d), m/s; zero: gas over the crest leaves as soon as liquid flows."""
 
     @property

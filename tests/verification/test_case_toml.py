@@ -62,7 +62,7 @@ def test_all_faults_are_named_at_once(claim_text: str) -> None:
         CaseDefinition.parse(broken, source="made_up/case.toml")
     lines = str(caught.value).splitlines()
     assert [line for line in lines if "title" in line]
-    assert [line for line in lines if "quantity.0.why" in line]
+    assert [line for line in lines if "[quantity.0] why" in line]
     assert all(line.startswith("made_up/case.toml: ") for line in lines)
 
 

@@ -167,7 +167,7 @@ def sweep_drawings(sweep: Sweep, *, width: float | None = None) -> list[Drawing]
 
 
 def _views(sweep: Sweep) -> list[View]:
-    """What the figure of each quantity shows; empty where no axis has numbers."""
+    """Content of each quantity's figure; empty where no axis has numbers."""
     axes = [
         axis
         for axis in sweep.plan.axes
@@ -180,11 +180,11 @@ def _views(sweep: Sweep) -> list[View]:
 
 def _shares(sweep: Sweep, result: SweepColumn, axes: list[SweepAxis]) -> list[float]:
     """Share of a result that each axis explains; zeros where not known."""
-    known = np.isfinite(result.array)
-    if np.count_nonzero(known) < MIN_ROWS:
+    finite = np.isfinite(result.array)
+    if np.count_nonzero(finite) < MIN_ROWS:
         return [0.0] * len(axes)
     keys = np.array([[point[axis.head] for axis in axes] for point in sweep.points], dtype=np.float64)
-    return [*map(float, shares_alone(keys[known], result.array[known])[0])]
+    return [*map(float, shares_alone(keys[finite], result.array[finite])[0])]
 
 
 def _view(sweep: Sweep, fields: dict[str, SweepColumn], name: str, axes: list[SweepAxis]) -> View:

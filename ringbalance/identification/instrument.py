@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
@@ -24,6 +24,25 @@ _CONVENTIONS: Mapping[str, str] = MappingProxyType(
     {"rms": "rms", **dict.fromkeys(("pp", "p-p", "pk-pk"), "peak_to_peak")}
 )
 """Convention of amplitudes by such a mark; zero to peak by any other."""
+_USUAL: Mapping[str, str] = MappingProxyType(
+    {
+        **dict.fromkeys(("velocity", "displacement", "acceleration", "vibration", "magnitude"), AMPLITUDE),
+        **dict.fromkeys(("overall", "level"), AMPLITUDE),
+        **dict.fromkeys(("rpm", "rotational_speed", "rotation_speed", "shaft_speed"), "speed"),
+        **dict.fromkeys(("time", "open_time", "opening_time", "duration", "pulse"), "gas_time"),
+        **dict.fromkeys(("weight", "trial_mass", "trial_weight"), "mass"),
+        **dict.fromkeys(("trial_angle", "weight_angle", "position"), "angle"),
+        **dict.fromkeys(("pressure_drop", "differential_pressure", "dp"), "pressure_difference"),
+        **dict.fromkeys(("flow", "volume_flow"), "flow_rate"),
+        "phase_angle": "phase",
+        "imbalance": "unbalance",
+        "gas_pressure": "pressure",
+        "fill": "fill_ratio",
+    }
+)
+"""Column of a kind by a name that instruments give it; of before and after an injection by its first part."""
+_TIMES: Final = ("time", "date", "timestamp", "date_time", "elapsed_time")
+"""Names of columns that tell rows apart, in a kind that needs no time."""
 _OF_A_PLANE: Final = re.compile(
     r"(amplitude|phase|unbalance|mass)_?(1|2|a|b|left|right|de|nde|plane\w*)|plane"
 )
@@ -41,10 +60,12 @@ def two_planes(table: CsvTable) -> tuple[Fault, ...]:
 
 def in_columns_of(table: CsvTable, kind: Kind) -> tuple[CsvTable, tuple[str, ...]]:
     """The table in the columns of a kind, and a sentence for each change."""
-    header, columns = dict(table.header), {head: table.texts(head) for head in table.heads}
+    usual, renamed = _usual_heads(table.heads, kind)
+    header = dict(table.header)
+    columns = {usual[head]: table.texts(head) for head in table.heads}
     if len(columns) < len(table.heads):
         return table, table.remarks
-    said = [*table.remarks]
+    said = [*table.remarks, *renamed]
     # Time stamps tell rows apart, as remarks do.
     stamps = [
         head
@@ -52,12 +73,12 @@ def in_columns_of(table: CsvTable, kind: Kind) -> tuple[CsvTable, tuple[str, ...
         if kind.column(_name(head)) is None
         and head not in kind.texts
         and any(cells)
-        and all(not cell or _STAMP.fullmatch(cell) for cell in cells)
+        and (_name(head) in _TIMES or all(not cell or _STAMP.fullmatch(cell) for cell in cells))
     ]
     if stamps:
         notes = [columns.pop(head) for head in (*stamps, "note") if head in columns]
         columns["note"] = tuple(" ".join(filter(None, cells)) for cells in zip(*notes, strict=True))
-        said.append(f"time stamps in {', '.join(stamps)} are taken as notes")
+        said.append(f"times in {', '.join(stamps)} are taken as notes")
     # The convention of amplitudes by the marks of their units.
     marks = {head: match for head in columns if (match := _MARKED.fullmatch(head))}
     words = {_CONVENTIONS.get(match[2].lower(), "zero_to_peak") for match in marks.values()}
@@ -87,7 +108,11 @@ def in_columns_of(table: CsvTable, kind: Kind) -> tuple[CsvTable, tuple[str, ...
         )
         if any(values)
     }
-    if left_out := [str(line) for line in table.lines if rows and line not in rows]:
+    # A row that agrees in every column tells nothing new, or would count a copy twice.
+    first: dict[tuple[str, ...], int] = {}
+    copies = [line for line, row in rows.items() if first.setdefault(row, line) != line and kind.balancer]
+    said += [f"line {line} is the same as line {first[rows.pop(line)]} and counts once" for line in copies]
+    if left_out := [str(line) for line in table.lines if rows and line not in (*rows, *copies)]:
         said.append(f"nothing was measured in lines {', '.join(left_out)}, which are left out")
     lines, cells_of_rows = (
         (tuple(rows), rows.values()) if rows else (table.lines, zip(*columns.values(), strict=True))
@@ -95,6 +120,24 @@ def in_columns_of(table: CsvTable, kind: Kind) -> tuple[CsvTable, tuple[str, ...
     return replace(table, header=header, heads=tuple(columns), lines=lines, rows=tuple(cells_of_rows)), tuple(
         said
     )
+
+
+def _usual_heads(heads: Sequence[str], kind: Kind) -> tuple[dict[str, str], list[str]]:
+    """Heads with the names that a kind has for columns of instruments, and a sentence for each change."""
+    usual, said = {head: head for head in heads}, []
+    taken = {column.name for column in kind.columns}
+    taken |= ({"mass"} if kind.column("unbalance") else set()) | ({"speed"} if kind.has_amplitudes else set())
+    for head in heads:
+        name, unit = split_head(head) or ("", "")
+        plain, names = name.replace(" ", "_"), {_name(each) for each in usual.values()}
+        when = next((end for end in ("_before", "_after") if plain.endswith(end)), "")
+        stem = plain.removesuffix(when)
+        meant = plain if plain in taken else _USUAL.get(stem, "") + when
+        if name not in taken and meant in taken and meant not in names:
+            unit = unit or ("rpm" if stem == "rpm" else "")
+            usual[head] = f"{meant} [{unit}]" if unit else meant
+            said.append(f"{head} is taken as {usual[head]}")
+    return usual, said
 
 
 def _name(head: str) -> str:

@@ -21,10 +21,12 @@ from ringbalance.identification.kinds.eccentric_mass import ECCENTRIC_MASS
 from ringbalance.identification.kinds.kind import DataColumn, Kind, Observations
 from ringbalance.identification.kinds.liquid_ring import LIQUID_RING
 from ringbalance.identification.tables import (
+    WINDOWS,
     CsvTable,
     data_fault,
     decoded,
     dimension_of,
+    encoding_of,
     file_name,
     in_order,
     parse_table,
@@ -99,6 +101,8 @@ def observations_of(
         return None, tuple(wrong)
     kind = KINDS[str(table.header["kind"])]
     table, remarks = in_columns_of(table, kind)
+    if encoding_of(content) == WINDOWS:
+        remarks += ("the text is read as Windows-1252, as it is not UTF-8",)
     wrong += _header_faults(table, kind)
     heads = [*two_planes(table)] or [*_head_faults(table, kind)]
     if heads:
@@ -111,7 +115,6 @@ def observations_of(
         remarks += _turned(head, kind, columns, speed)
     uncertainty, stated_faults = _stated_uncertainty(table, kind, columns, speed)
     wrong += [*cell_faults, *_faults_of_scene(table, kind, scene, columns), *stated_faults]
-    wrong += _repeated(table) if kind.balancer else ()
     if wrong:
         return None, tuple(wrong)
     # From the file's convention of amplitudes to zero to peak.
@@ -178,6 +181,8 @@ def _head_faults(table: CsvTable, kind: Kind) -> Iterator[Fault]:
         try:
             if column is None and name in kind.texts and unit:
                 raise FieldError("a column of text has no unit", name)
+            if name == _SPEED and kind.has_amplitudes:
+                continue
             if column is None and name not in kind.texts and name.replace("_", "").islower():
                 problem = f"a file of this kind has no such column{did_you_mean(name, allowed_names)}"
                 raise FieldError(problem, ", ".join(allowed_names))
@@ -287,18 +292,6 @@ def _faults_of_scene(
                 if total * (1 + _ROUNDED) < fill <= 1:
                     problem = f"the chambers of a pair hold {total:.4g} together, twice disc.initial_fill"
                     yield table.fault(line, head, cell, problem, f"from 0 to {total:.4g}")
-
-
-def _repeated(table: CsvTable) -> Iterator[Fault]:
-    """Yield errors for repeated rows, which would count twice."""
-    first: dict[tuple[str, ...], int] = {}
-    for line, row in zip(table.lines, table.rows, strict=True):
-        if first.setdefault(row, line) != line:
-            problem = (
-                f"the row is the same as line {first[row]}; remove it, or tell the two apart in a column "
-                '"note" where it was measured again'
-            )
-            yield data_fault(table.file, f"line {line}", problem)
 
 
 def _zero_to_peak(columns: Mapping[str, FloatArray], kind: Kind, factor: float) -> dict[str, FloatArray]:

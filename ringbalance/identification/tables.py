@@ -39,6 +39,7 @@ _LINE: Final = re.compile(r"line (\d+)")
 _WORKBOOKS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """First bytes of .xlsx or .ods, and of .xls."""
 _UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
+WINDOWS: Final = "cp1252"
 _DECIMAL_COMMA: Final = re.compile(r"([+-]?\d+),(\d+(?:[eE][+-]?\d+)?)")
 _THOUSANDS: Final = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _POINT: Final = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
@@ -142,17 +143,28 @@ def decoded(content: bytes, *, file: str) -> tuple[str, tuple[Fault, ...]]:
         return "", (data_fault(file, "", problem),)
     problem, at = "", -1
     try:
-        text = content.decode("utf-16" if content.startswith(_UTF_16) else "utf-8-sig")
+        text = content.decode(encoding_of(content))
         if "\0" in text:
             problem, at = "this is not text but binary data", content.index(b"\0")
     except UnicodeDecodeError as error:
-        problem, at = "this is not UTF-8 text", error.start
+        problem, at = "this is neither UTF-8 nor Windows-1252 text", error.start
     if not problem:
         return text, ()
     before = content[:at]
     line, start = before.count(b"\n") + 1, before.rfind(b"\n") + 1
     position = f"line {line}, character {len(before[start:].decode('utf-8-sig', 'replace')) + 1}"
     return "", (data_fault(file, position, f'{problem}; save the file as "CSV UTF-8"'),)
+
+
+def encoding_of(content: bytes) -> str:
+    """Encoding of a text: UTF-16 by its mark, UTF-8, or what a western spreadsheet on Windows writes."""
+    if content.startswith(_UTF_16):
+        return "utf-16"
+    try:
+        content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return WINDOWS
+    return "utf-8-sig"
 
 
 def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[CsvTable | None, tuple[Fault, ...]]:

@@ -154,8 +154,57 @@ def test_two_copies_with_time_stamps_are_two_measurements(paper_scene: Scene) ->
         text().replace(heads, f"{heads},time").replace(".0\n", ".0,10:01\n").replace(".5\n", ".5,10:02\n")
     )
     assert len(read(content + "400.0,180,12.5,110.0,10:07:30\n", paper_scene)) == 5
-    with pytest.raises(SceneError, match="the row is the same"):
-        read(content + "400.0,180,12.5,110.0,10:01\n", paper_scene)
+    copied = read(content + "400.0,180,12.5,110.0,10:01\n", paper_scene)
+    assert len(copied) == 4
+    assert "line 9 is the same as line 8 and counts once" in copied.remarks
+
+
+def test_a_copied_row_changes_no_answer(paper_scene: Scene) -> None:
+    """Counted twice, it would narrow the intervals."""
+    assert_same(text() + "400.0,180,12.5,110.0\n", paper_scene)
+
+
+@pytest.mark.parametrize(
+    ("heads", "said"),
+    [
+        ("imbalance [g*mm],weight angle [deg],Displacement [um],Phase Angle [deg]", "displacement [um]"),
+        ("unbalance [g*mm],position [deg],vibration (um),phase [deg]", "vibration [um]"),
+        ("Unbalance [g*mm],trial_angle [deg],overall [um 0-p],phase angle [deg]", "overall [um 0-p]"),
+    ],
+)
+def test_usual_names_of_columns_are_understood_and_said(heads: str, said: str, paper_scene: Scene) -> None:
+    remarks = assert_same(text(heads), paper_scene).remarks
+    assert f"{said} is taken as amplitude [um" in str(remarks)
+
+
+def test_a_velocity_by_its_name_and_times_in_seconds(paper_scene: Scene) -> None:
+    heads, rows = text().split("unbalance", 1)[0], text().splitlines()[-4:]
+    size = OMEGA * 1e-3
+    lines = [line.split(",") for line in rows]
+    cells = "\n".join(
+        f"{u},{w},{float(a) * size!r},{float(p) + 90!r},{60 * at}" for at, (u, w, a, p) in enumerate(lines)
+    )
+    read_as = assert_same(
+        f"{heads}unbalance [g*mm],angle [deg],velocity [mm/s],phase [deg],time [s]\n{cells}\n", paper_scene
+    )
+    assert "velocity [mm/s] is taken as amplitude [mm/s]" in read_as.remarks
+    assert "times in time [s] are taken as notes" in read_as.remarks
+    heads = "unbalance [g*mm],angle [deg],amplitude [um],phase [deg],rpm"
+    turning = text(heads).replace(".0\n", ".0,10000\n")
+        ".0\n", ".0,10000\n"
+    )
+    assert_same(turning.replace(".5\n", ".5,10000\n"), paper_scene)
+    # Of an injection `time` is the valve's; a name that fits nothing is named with what is looked for.
+    with pytest.raises(SceneError, match=r'"loudness \[um\]".* no such column') as error:
+        read(text().replace("amplitude [um]", "loudness [um]"), paper_scene)
+    assert 'the column "amplitude [um]" is missing' in str(error.value)
+
+
+def test_a_text_of_windows_is_read_and_said(paper_scene: Scene) -> None:
+    written = text().replace("rig 4", "Prüfstand 4").replace("[um]", "[µm]").replace("[deg]", "[°]")
+    observations = assert_same(written.encode("cp1252"), paper_scene)
+    assert observations.source == "Prüfstand 4"
+    assert "the text is read as Windows-1252, as it is not UTF-8" in observations.remarks
 
 
 @pytest.mark.parametrize(

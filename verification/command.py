@@ -140,8 +140,11 @@ def _print_judgement(document: Mapping[str, Any]) -> None:
 
 def _print_results(results: Sequence[CaseResult]) -> None:
     console = results_console()
-    for result in () if display().brief else results:
-        console.print(result.rows().view(headline=False), "")
+    for result in results:
+        if not display().brief:
+            console.print(result.rows().view(headline=False), "")
+        elif result.broken or result.verdict in (Verdict.FAILED, Verdict.REFUTED):
+            console.print(result.brief, markup=False, highlight=False)
     counts = Counter(result.verdict for result in results)
     total = ", ".join(f"{counts[verdict]} {verdict}" for verdict in Verdict if counts[verdict])
     if broken := sum(result.broken for result in results):

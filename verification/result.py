@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Self
 
 from ringbalance.results.numbers import format_given, percent
+from ringbalance.results.numbers import plain as plain_text
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.typed_record import plain
@@ -218,6 +219,20 @@ class CaseResult(Result):
         """The sentence for a designer, empty where the case was not run."""
         run = self.verdict is not Verdict.NOT_RUN
         return self.filled(self.definition.consequence_of(self.verdict)) if run else ""
+
+    @property
+    def brief(self) -> str:
+        """Case and verdict in a line, with the quantity that departs most, relative to its reference."""
+        apart = {
+            abs(each.deviation.error / ((each.number.reference and each.number.reference.value) or 1.0)): each
+            for each in self.quantities
+            if each.verdict is self.verdict and each.number is not None and each.deviation is not None
+        }
+        title = self.rows().title
+        if not apart:
+            return title
+        name, found, against, *_ = apart[max(apart)].cells()
+        return plain_text(f"{title}: {name} {found}, to be {against}")
 
     def to_dict(self) -> Document:
         """The result and all that a report shows of it; SI units, or the unit named beside the number."""

@@ -157,9 +157,13 @@ def _header_faults(table: CsvTable, kind: Kind) -> Iterator[Fault]:
             yield data_fault(table.file, toml_text(key), problem, allowed=", ".join(allowed_keys))
         elif key in _TEXTS and not isinstance(value, str):
             yield data_fault(table.file, key, "it is not text", value=toml_text(value), allowed='"..."')
-    for key in ("source", *([] if kind.balancer else [_UNCERTAINTY])):
+    names = {(split_head(head) or ("",))[0] for head in table.heads}
+    in_rows = not names.isdisjoint(column.name for column in kind.uncertainties())
+    for key in ("source", *([] if kind.balancer or in_rows else [_UNCERTAINTY])):
         if key not in table.header:
-            yield data_fault(table.file, "", f'the key "{key}" is missing in the first lines, marked #')
+            problem = f'the key "{key}" is missing in the first lines, marked #'
+            problem += ", and no column has it" * (key == _UNCERTAINTY)
+            yield data_fault(table.file, "", problem)
     if not str(table.header.get("source", "-")).strip():
         yield data_fault(table.file, "source", "it is empty", allowed="rig, run and date")
     stated = table.header.get(AMPLITUDE)

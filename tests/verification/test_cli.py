@@ -19,6 +19,19 @@ from ringbalance.verification.evidence import Found
 from ringbalance.verification.runner import run_definition
 
 
+def test_a_column_of_uncertainties_needs_no_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = '# kind = "friction"\n# source = "rig"\nreynolds,friction_factor,series{}\n5200,0.0371,a{}\n'
+    text += "8100,0.0330,a{}\n"
+    answers = []
+    for head, cell in ((",uncertainty", ",0.02"), (",uncertainty_friction_factor [%]", ",2"), ("", "")):
+        (tmp_path / "rig.csv").write_text(text.format(head, cell, cell), encoding="utf-8")
+        answers.append((main(["verify", "--data", str(tmp_path / "rig.csv")]), capsys.readouterr().err))
+    assert [code for code, _ in answers] == [0, 0, 2]
+    assert (
+        'the key "uncertainty" is missing in the first lines, marked #, and no column has it' in answers[2][1]
+    )
+
+
 def test_json_is_one_clean_document(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command("verify", case_ids=("gci_celik2008", "claim_12_correction_mass"), json=True) == 0
     printed = capsys.readouterr()
@@ -35,6 +48,17 @@ def test_the_table_says_verdict_and_consequence(capsys: pytest.CaptureFixture[st
     assert "Read 72 mm per transferred mass" in words
     assert "confirmed, caught" in words
     assert words.endswith("1 refuted")
+
+
+def test_a_brief_answer_names_what_is_refuted_with_the_quantity_that_departs_most(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Of the two readings of Eq. 22 one is 1.83 times the reference, the other 1.828 times."""
+    assert main(["verify", "claim_12_correction_mass", "gci_celik2008", "--brief", "--quiet"]) == 0
+    refuted, total = " ".join(capsys.readouterr().out.split()).split(" g mm 1 ")
+    assert refuted.startswith("claim_12_correction_mass claim 12, liquid ring refuted: Eq. 22 for ")
+    assert " g mm, to be 1" in refuted
+    assert total == "passed, 1 refuted"
 
 
 def test_the_table_shows_the_limit_that_judged(capsys: pytest.CaptureFixture[str]) -> None:

@@ -191,8 +191,6 @@ def test_a_velocity_by_its_name_and_times_in_seconds(paper_scene: Scene) -> None
     assert "times in time [s] are taken as notes" in read_as.remarks
     heads = "unbalance [g*mm],angle [deg],amplitude [um],phase [deg],rpm"
     turning = text(heads).replace(".0\n", ".0,10000\n")
-        ".0\n", ".0,10000\n"
-    )
     assert_same(turning.replace(".5\n", ".5,10000\n"), paper_scene)
     # Of an injection `time` is the valve's; a name that fits nothing is named with what is looked for.
     with pytest.raises(SceneError, match=r'"loudness \[um\]".* no such column') as error:

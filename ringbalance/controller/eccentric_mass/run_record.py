@@ -359,6 +359,8 @@ class EccentricRun(PresentedResult):
         if self.outcome in OF_DRIVES and self.run_away > _RUN_AWAY_TURNS:
             saturated = self.saturation > _SATURATED_FRACTION * self.end
             code = "masses_run_away" if saturated else "masses_turn"
+        elif self.outcome is EccentricOutcome.SETTLED and self.stage != Stage.REST:
+            code = "strategy_failed" if self.stage == Stage.FAILED else "strategy_not_finished"
         elif self.outcome is EccentricOutcome.LOCKED and self.within_since is not None:
             code = "masses_locked_within"
         elif (
@@ -382,14 +384,12 @@ class EccentricRun(PresentedResult):
     @cached_property
     def warned(self) -> tuple[Finding, ...]:
         """Findings that a user should know although the run continued."""
-        keys, settled = self.scene.imbalance_filter, self.outcome is EccentricOutcome.SETTLED
+        keys = self.scene.imbalance_filter
         unlike = self.innovation is not None and self.innovation > _WRONG_MODEL_INNOVATION
         # The Euler transition is the cause to remove first.
         by_euler = keys.discretisation == "euler" and (unlike or keys.step > _euler_limit(self))
         nearly_stalled = self._stalled_fraction > _NOTICEABLE_STALL_FRACTION
         due = {
-            "strategy_not_finished": settled and self.stage not in {Stage.REST, Stage.FAILED},
-            "strategy_failed": settled and self.stage == Stage.FAILED,
             "drive_nearly_stalled": nearly_stalled and not self.friction_known,
             "voltage_at_limit": self.saturation > 0,
             "euler_too_coarse": by_euler,

@@ -73,7 +73,7 @@ def test_a_run_is_judged_by_its_amplitude_whatever_the_strategy_still_does() -> 
         run = each.run
         last = run.amplitude[run.time >= run.settling_time]
         assert last.max() <= run.limit
-        said = "strategy_not_finished" in {finding.code for finding in run.warned}
+        said = run.ended.code == "strategy_not_finished"
         assert said == (run.stages[-1].name != "rest")
         unfinished += said
     assert unfinished >= 8
@@ -85,7 +85,9 @@ def test_a_limit_above_the_vibration_is_met_without_a_strategy() -> None:
     noisy = {"sensor.encoder_noise": math.radians(3), "sensor.encoder_rate_noise": 0.5}
     run = simulate_eccentric(changed(paper, {**noisy, "supervisor.limit": 14e-3}))
     assert run.settled
-    assert "strategy_not_finished" in {finding.code for finding in run.warned}
+    assert run.ended.code == "strategy_not_finished"
+    assert "no further correction needed" not in run.status
+    assert "ended the run during the stage" in run.status
 
 
 def test_a_wrong_influence_is_met_by_smaller_steps() -> None:

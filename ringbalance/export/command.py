@@ -13,10 +13,12 @@ from ringbalance.export.hosts import c_files, csv_files, identifier, js_files, p
 from ringbalance.export.libraries import EXTRA
 from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model.calibration import chamber_and_law
+from ringbalance.results.rows import Finding
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.terminal import activity, print_message, results_console
 from ringbalance.scene.registry import imported
@@ -89,11 +91,31 @@ def export(options: SimpleNamespace) -> int:
             files = {file: text.encode() for file, text in texts.items()}
         for file, content in files.items():
             (folder / file).write_bytes(content)
+    _warn_of_loop(scene, kind)
     for file in files:
         results_console().print(str(options.out / file), highlight=False)
     exact = f", velocities within {compact.departure:.1e} of the calibrated law's" if compact else ""
     print_message(f"{block.size} bytes of constants{exact}")
     return 0
+
+
+def _warn_of_loop(scene: SceneFile, kind: str) -> None:
+    """Say that the loop of an exported controller's settings is unstable or close to it."""
+    if kind != "controller":
+        return
+    if scene.balancer == "eccentric_mass":
+        for each in imported("ringbalance.controller.eccentric_mass.run_record:unstable_loops")(scene):
+            print_message(each.text)
+        return
+    ring = liquid_ring_scene(scene)
+    if ring.controller.kind != "target_vector":
+        return
+    law = chamber_and_law(ring, checked=False, varied=False)[1]
+    loop = imported("ringbalance.controller.liquid_ring.linear_loop:linear_loop")(ring, flow_law=law)
+    if loop.zone == "D":
+        margins = {"gain": loop.margins.gain_factor, "phase": loop.margins.phase}
+        state = "near instability" if loop.stable else "unstable"
+        print_message(Finding(code="loop_zone_d", values={"state": state, **margins}).text)
 
 
 def _ring_block(scene: Scene, kind: str) -> tuple[Block, CompactLaw | None]:

@@ -54,6 +54,29 @@ def test_bad_input_is_one_error_and_no_file(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("name", "change", "says"),
+    [
+        ("grinding_spindle", ("0.856 s/um", "1.5 s/um"), "the loop is near instability: gain margin 1.1"),
+        ("grinding_spindle", ("0.856 s/um", "2.5 s/um"), "the loop is unstable: gain margin 0.68"),
+        ("grinding_spindle", ("0.856 s/um", "0.8 s/um"), ""),
+        ("washing_machine", ("state_weight = 3.5", "state_weight = 1e9"), "the regulator is unstable"),
+        ("washing_machine", ("", ""), ""),
+    ],
+)
+def test_settings_of_an_unstable_loop_are_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, change: tuple[str, str], says: str
+) -> None:
+    scene = tmp_path / "scene.toml"
+    text = rb.bundled_scene(name).read_text(encoding="utf-8")
+    scene.write_text(text.replace(*change, 1), encoding="utf-8")
+    words = ["--to", "python", "--block", "controller", "--out", str(tmp_path / "out")]
+    assert main(["export", str(scene), *words]) == 0
+    told = capsys.readouterr().err.replace("\n", " ")
+    assert says in told
+    assert ("unstable" in told or "near instability" in told) == bool(says)
+
+
 def test_a_law_based_scene_exports_its_controller(tmp_path: Path) -> None:
     """What `tune --save` may recommend."""
     text = Path(OIL).read_text(encoding="utf-8")

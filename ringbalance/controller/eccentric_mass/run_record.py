@@ -350,7 +350,7 @@ class EccentricRun(PresentedResult):
     @cached_property
     def ended(self) -> Finding:
         """Finding on the end of the run, with its numbers."""
-        if self.outcome in OF_DRIVES and (unstable := next(_unstable(self.scene), None)):
+        if self.outcome in OF_DRIVES and (unstable := next(unstable_loops(self.scene), None)):
             values = {**self._numbers, **unstable.values}
             names = sentences()["masses_unstable"].values
             finding = Finding(code="masses_unstable", values={name: values[name] for name in names})
@@ -397,7 +397,7 @@ class EccentricRun(PresentedResult):
             "drives_stay_on": int(self.history["hold"][-1]) == Hold.HELD,
             "masses_meet": self.least_gap < self.scene.masses.gap,
         }
-        return (*_unstable(self.scene), *(self._finding(code) for code, is_due in due.items() if is_due))
+        return (*unstable_loops(self.scene), *(self._finding(code) for code, is_due in due.items() if is_due))
 
     @property
     def status(self) -> str:
@@ -417,7 +417,7 @@ def _euler_limit(run: EccentricRun) -> float:
     return float(believed_whirl(run.scene).euler_step_limit(angular_velocity=fastest))
 
 
-def _unstable(scene: EccentricScene) -> Iterator[Finding]:
+def unstable_loops(scene: EccentricScene) -> Iterator[Finding]:
     """Yield each loop whose poles are outside the unit circle, with the gain or the hold that suffices."""
     if scene.supervisor.strategy == "locked":
         return

@@ -183,7 +183,7 @@ def interpreter_error() -> str:
 
 
 def drop_unusable_size(environment: MutableMapping[str, str]) -> None:
-    """Remove a terminal size that no table fits into: the actual size, or 80 columns, is then used.
+    """Remove a terminal size that no table fits into: the actual size is then used.
 
     Args: `environment`: variables of the process; COLUMNS below 20, LINES below 1 and values that are no
         numbers are removed.

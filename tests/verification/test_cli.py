@@ -61,6 +61,18 @@ def test_a_brief_answer_names_what_is_refuted_with_the_quantity_that_departs_mos
     assert total == "passed, 1 refuted"
 
 
+def test_a_table_in_a_file_is_not_broken_unless_columns_says_so(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row = "Eq. 22 for two adjacent full chambers, taken literally (3447"
+    for columns in ("", "60"):
+        monkeypatch.setenv("COLUMNS", columns) if columns else monkeypatch.delenv("COLUMNS", raising=False)
+        assert run_command("verify", case_ids=("claim_12_correction_mass",)) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert any(line.startswith(f" {row}") for line in lines) == (not columns)
+        assert any(line.startswith("consequence") and len(line) > 100 for line in lines) == (not columns)
+
+
 def test_the_table_shows_the_limit_that_judged(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command("verify", case_ids=("rotating_section",)) == 0
     words = " ".join(capsys.readouterr().out.split())

@@ -27,6 +27,8 @@ FIRST_LINE_S: Final = 10.0
 """Time before the first line without a terminal."""
 NEXT_LINE_S: Final = 30.0
 _LOG_INTERVAL_S: Final = 1.0
+_UNBROKEN: Final = 10_000
+"""Columns of an output that is no terminal: wider than any table."""
 _LOADED: Final = time.perf_counter()
 _STAT: Final = Path("/proc/self/stat")
 _START_FIELD: Final = 19
@@ -54,8 +56,13 @@ class _Terminal(Console):
 
 
 def results_console() -> Console:
-    """Standard output, for results."""
-    return _Terminal()
+    """Standard output, for results; in a file or a pipe nothing is broken into lines, unless COLUMNS says how
+    wide they are.
+    """
+    console = _Terminal()
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = _UNBROKEN
+    return console
 
 
 def _messages_console() -> Console:

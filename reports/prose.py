@@ -14,6 +14,7 @@ from typing import Any, Final, cast
 
 from markupsafe import escape
 
+from ringbalance.results.numbers import SUPERSCRIPTS, power_of_ten
 from ringbalance.scene.errors import FITTED
 
 _GREEK: Final = {
@@ -32,7 +33,6 @@ _GREEK: Final = {
     "sigma": "σ",
     "theta": "θ",
 }
-_SUPERSCRIPTS: Final = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _SUBSCRIPTS: Final = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 _GREEK_WORD: Final = re.compile(rf"(?<![\w\\])({'|'.join(_GREEK)})(?![a-z])")
 _POWER: Final = re.compile(r"\^(?:\((-?\d+)\)|(-?\d+))(?!\.?\d)")
@@ -87,8 +87,8 @@ def typeset(text: str) -> str:
         lambda match: f"{match[1] or match[2]}{match[3].translate(_SUBSCRIPTS)}{'′' if match[4] else ''}",
         text,
     )
-    text = _POWER.sub(lambda match: (match[1] or match[2]).translate(_SUPERSCRIPTS), text)
-    text = _EXPONENT.sub(lambda match: f"\u202f×\u202f10{str(int(match[1])).translate(_SUPERSCRIPTS)}", text)
+    text = _POWER.sub(lambda match: (match[1] or match[2]).translate(SUPERSCRIPTS), text)
+    text = _EXPONENT.sub(lambda match: f"\u202f×\u202f{power_of_ten(int(match[1]))}", text)
     for pattern, sign in _UNITS.items():
         text = re.sub(pattern, sign, text)
     return text

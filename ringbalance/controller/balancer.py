@@ -24,6 +24,7 @@ from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.kinds import scene_kind
+from ringbalance.scene.narrowing import scene_as
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.registry import registered, unusable
 from ringbalance.scene.units import DIMENSIONS
@@ -273,6 +274,9 @@ class Balancer(ABC):
     watched_to_end: bool = True
     """True if every run is watched to its time limit, whatever the arguments."""
 
+    def __init__(self, scene: Any, rotors: Rotors | None = None) -> None:
+        self.scene, self._rotors = scene, rotors
+
     @property
     def models_used(self) -> tuple[Any, ...]:
         """Every physical term, with its model and its estimated contribution; empty: one model covers all."""
@@ -362,9 +366,9 @@ class Balancer(ABC):
         """This balancer without a part of its working liquid, of which its controller does not know."""
         return self
 
-    @abstractmethod
     def on_scene(self, scene: SceneFile) -> Self:
         """Balancer of another scene of its kind, with the same options."""
+        return type(self)(scene_as(type(self.scene), scene), self._rotors)
 
     @abstractmethod
     def rotor(self, number: int | None = None) -> CommonRotor:

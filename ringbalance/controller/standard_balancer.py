@@ -42,7 +42,6 @@ from ringbalance.scene.keys.fields import (
 )
 from ringbalance.scene.keys.schema import Schema, TableSchema
 from ringbalance.scene.kinds import Check, SceneKind, reader_of
-from ringbalance.scene.narrowing import scene_as
 from ringbalance.scene.origins import SceneFile, value_at, with_values_at
 from ringbalance.scene.uncertain import NORMAL_95
 
@@ -177,9 +176,6 @@ class StandardBalancer(Balancer):
     setting_paths: ClassVar[tuple[str, ...]] = ()
     """Paths of the settings that are searched, from a thirtieth to thirty times the scene's value."""
 
-    def __init__(self, scene: Any, rotors: Rotors | None = None) -> None:
-        self.scene, self._rotors = scene, rotors
-
     @abstractmethod
     def reach(self, device: Any) -> float:
         """Largest unbalance that a device, given as its scene, cancels in every direction, kg m."""
@@ -300,9 +296,6 @@ class StandardBalancer(Balancer):
         else:
             ended = Finding(code="above_limit", values=end)
         return replace(run, findings=(ended, *self.findings(run, device)))
-
-    def on_scene(self, scene: SceneFile) -> Self:
-        return type(self)(scene_as(type(self.scene), scene), self._rotors)
 
     def rotor(self, number: int | None = None) -> CommonRotor:
         scene = self.scene

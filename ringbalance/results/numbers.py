@@ -17,7 +17,7 @@ MINUS: Final = "\u2212"
 PLUS_MINUS: Final = "\u00a0±\u00a0"
 MISSING: Final = "–"
 
-_SUPERSCRIPTS: Final = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+SUPERSCRIPTS: Final = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _MAX_DIGITS: Final = 7
 _TABLE_DIGITS: Final = 9
 _UNSTATED_DIGITS: Final = 4
@@ -36,7 +36,7 @@ _MAX_PLAIN_EXPONENT: Final = 6
 
 def power_of_ten(exponent: int) -> str:
     """Power of ten in plain text, such as 10⁻³."""
-    return f"10{str(exponent).translate(_SUPERSCRIPTS)}"
+    return f"10{str(exponent).translate(SUPERSCRIPTS)}"
 
 
 def last_place(total: float) -> int:

@@ -90,6 +90,11 @@ def closest(word: str, words: Iterable[str]) -> str:
     return folded[close[0]] if close else ""
 
 
+def plain_name(name: str) -> str:
+    """A name by its letters and digits alone: case, spaces and dashes do not matter."""
+    return "".join(character for character in name.casefold() if character.isalnum())
+
+
 def did_you_mean(word: str, words: Iterable[str]) -> str:
     """' (did you mean "x"?)' with the known word that is closest; empty when none is close."""
     return meant_text(closest(word, words))

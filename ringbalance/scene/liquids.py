@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebval
 
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.faults import Fault, did_you_mean
+from ringbalance.scene.faults import Fault, did_you_mean, plain_name
 from ringbalance.scene.keys.reading import SceneReading
 from ringbalance.scene.models import Liquid
 from ringbalance.scene.platform.files import packaged_rows
@@ -85,8 +85,8 @@ def known_liquids() -> tuple[KnownLiquid, ...]:
 
 def _find_liquid(*, name: str) -> KnownLiquid | None:
     """The liquid of any of its names, such as "Silicone oil 100 cSt"; None when no liquid has it."""
-    plain = _plain(name)
-    return next((liquid for liquid in known_liquids() if plain in map(_plain, _names(liquid))), None)
+    plain = plain_name(name)
+    return next((liquid for liquid in known_liquids() if plain in map(plain_name, _names(liquid))), None)
 
 
 def _unknown_liquid(*, name: str) -> FieldError:
@@ -157,10 +157,6 @@ def liquids_at_room_temperature() -> tuple[Liquid, ...]:
 
 def _names(liquid: KnownLiquid) -> tuple[str, ...]:
     return (liquid.name, *liquid.aliases)
-
-
-def _plain(name: str) -> str:
-    return "".join(character for character in name.casefold() if character.isalnum())
 
 
 @cache

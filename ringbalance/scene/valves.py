@@ -7,6 +7,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import Annotated, Final
 
+from ringbalance.scene.faults import plain_name
 from ringbalance.scene.keys.declaration import needed, unused
 from ringbalance.scene.keys.fields import POSITIVE, OneLine, ProperFraction, Time, number, quantity
 from ringbalance.scene.platform.files import packaged_rows
@@ -110,7 +111,9 @@ def known_valves() -> Mapping[str, Valve]:
 
 def find_valve(name: str) -> Valve | None:
     """The valve of the catalogue with a name; case, spaces and dashes do not matter."""
-    return next((valve for each, valve in known_valves().items() if _plain(each) == _plain(name)), None)
+    return next(
+        (valve for each, valve in known_valves().items() if plain_name(each) == plain_name(name)), None
+    )
 
 
 def taken_ratio(names: Iterable[str]) -> str:
@@ -122,10 +125,6 @@ def assumed_lag(valves: Iterable[Valve]) -> str:
     """Sentence about valves whose lag is assumed."""
     lags = ", ".join(f"{1e3 * each.lag:g} ms of {each.name}" for each in valves)
     return f"a lag is assumed, as none is stated, {lags}: ask the seller"
-
-
-def _plain(name: str) -> str:
-    return "".join(character for character in name.casefold() if character.isalnum())
 
 
 def sonic_conductance(key: str, value: float, *, critical_ratio: float) -> float:

@@ -92,9 +92,6 @@ class EccentricMassBalancer(Balancer):
     energy_kind = "energy_electrical"
     scene: EccentricScene
 
-    def __init__(self, scene: EccentricScene, rotors: Rotors | None = None) -> None:
-        self.scene, self._rotors = scene, rotors
-
     def settings(self) -> tuple[Setting, ...]:
         """Gains of the drives, each with the scene's value and its bounds."""
         values = ((path, value_at(self.scene, path)) for path in _GAINS)
@@ -215,10 +212,6 @@ class EccentricMassBalancer(Balancer):
         if name.startswith(FITTED):
             return DrawnInput(common=True, measure=MEASURE_INPUT)
         return super().drawn_input(name)
-
-    def on_scene(self, scene: SceneFile) -> EccentricMassBalancer:
-        """Balancer of another scene; see `Balancer`."""
-        return EccentricMassBalancer(eccentric_scene(scene), self._rotors)
 
     def rotor(self, number: int | None = None) -> CommonRotor:
         """Rotor at the speed at which the strategy starts; see `Balancer`."""

@@ -39,6 +39,8 @@ _EDGE_FRACTION: Final = 0.02
 """Distance, as a fraction of the varied range, below which a value counts as at the end."""
 STORE: Final = "store"
 """Name of the folder with stored results, within the folder of a sweep."""
+_MOST_NAMED: Final = 6
+"""Rows that a sentence names, at most."""
 _RUN_COLUMNS: Final = {
     "devices": ("devices", ""),
     "fraction": ("fraction", "1"),
@@ -349,6 +351,7 @@ class Sweep(Result):
             by = "settles first" if self.runs else "cancels most in any direction, nothing was run"
             values: dict[str, Value] = {"row": best, "by": by, "changes": self._change_text(best)}
             yield Finding(code="sweep_best", values=values)
+            yield from self._alike(best)
             # Keys with a value at an end of their varied range.
             for path in (path for axis in self.plan.axes if not axis.names for path in axis.paths):
                 numbers = [value for point in self.points if isinstance(value := point.get(path), float)]
@@ -363,6 +366,7 @@ class Sweep(Result):
             fraction = self.driven[nearest]["fraction"]
             values = {"row": nearest, "changes": self._change_text(nearest), "fraction": fraction}
             yield Finding(code="sweep_nearest", values=values)
+            yield from self._alike(nearest)
         if failed := [text for text in self.failures if text]:
             yield Finding(code="sweep_refused", values={"count": len(failed), "text": failed[0]})
         tolerance = float(getattr(self.scene, "tolerance", math.inf))
@@ -378,6 +382,24 @@ class Sweep(Result):
             yield Finding(code="sweep_intervals")
         if self.plan.sample and len(self.points) >= MIN_ROWS and not self._main_shares:
             yield Finding(code="sweep_no_shares", values={"name": self.main_result})
+
+    def _alike(self, row: int) -> Iterator[Finding]:
+        """Finding that drawn devices do not tell other rows from the best or the nearest one.
+
+        Without runs none: the intervals are by inputs that all rows share, and their order is known better.
+        """
+        chosen, others = self.driven[row], [i for i in range(len(self.driven)) if i != row]
+        if self.best is None:
+            what = "fraction"
+            like = [i for i in others if (self.driven[i]["high"] or 0.0) >= chosen["fraction"]]
+        else:
+            what, last = "settling time", chosen["settling_time_high"] or math.inf
+            times = {i: self.driven[i]["settling_time"] for i in others if self.feasible[i]}
+            like = [i for i, time in times.items() if time is not None and time <= last]
+        if self.runs and like:
+            rows = [f"row {i}" for i in like[:_MOST_NAMED]]
+            rows += [f"{len(like) - _MOST_NAMED} more"] if len(like) > _MOST_NAMED else []
+            yield Finding(code="sweep_alike", values={"row": row, "others": rows, "what": what})
 
     def _change_text(self, row: int) -> str:
         return ", ".join(self.axis_text(axis, row) for axis in self.plan.axes)

@@ -18,7 +18,7 @@ from ringbalance.controller.balancer import Draws, balancer_of, quick_balancer
 from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE, judged_all
 from ringbalance.design.static import EMPTY, UNITS, _row
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.results.requirements import MET, OPEN, Proportion
+from ringbalance.results.requirements import MET, MISSED, OPEN, Proportion
 from ringbalance.scene.models import Scene
 
 
@@ -206,6 +206,29 @@ def test_where_no_point_serves_enough_devices_the_nearest_is_named(paper_scene: 
     assert (sweep.best, sweep.nearest) == (None, 1)
     assert "sweep_nearest" in {each.code for each in sweep.rows().findings}
     assert sweep.rows().tables[1].caption == "Nearest: row 1"
+
+
+def test_rows_that_runs_do_not_tell_from_the_best_are_named(paper_scene: Scene) -> None:
+    """Those that settle by the upper bound of its time; of the nearest, those that may serve as many."""
+    sweep = rb.sweep(paper_scene, {"gas.pressure": [5e5, 6e5, 7e5, 8e5]}, runs=4, intervals=False)
+    best = {"verdict": MET, "settling_time_high": 9.0}
+    rows = [{**best, "settling_time": time} for time in (5.0, 9.0, 9.1)]
+    missed = {**best, "verdict": MISSED, "settling_time": 6.0}
+
+    def said(driven: list[dict[str, object]]) -> list[str]:
+        changed = replace(sweep, driven=tuple({**sweep.driven[0], **each} for each in driven))
+        return [each.text for each in changed.rows().findings if each.code == "sweep_alike"]
+
+    assert said([*rows, missed]) == [
+        "row 0 is not told from row 1 by these runs: they differ by less than the interval (95 %) of its "
+        "settling time"
+    ]
+    assert not said([rows[0], *rows[2:], missed, missed])
+    shares = [{"verdict": MISSED, "fraction": 0.5, "high": high} for high in (0.6, 0.4, 0.49)]
+    assert not said([*shares, {**shares[1], "fraction": 0.1}])
+    (text,) = said([*shares, {**shares[0], "fraction": 0.45}])
+    assert "row 0 is not told from row 3" in text
+    assert text.endswith("of its fraction")
 
 
 def test_intervals_of_a_sweep_say_that_they_are_of_inputs_alone(paper_scene: Scene) -> None:

@@ -132,7 +132,7 @@ def _measured(case: Mapping[str, Any]) -> str:
     if "worst_mean" in numbers:
         parts.append(f"means off by up to {100 * numbers['worst_mean']:+.1f} %")
     if all_points > (points or 0):
-        parts.append(f"of all {all_points:.0f} {_percent(numbers['all_within'])} within")
+        parts.append(f"of all {all_points:.0f}: {_percent(numbers['all_within'])} within")
     verdict = "" if case["verdict"] == "confirmed" else f" ({case['verdict']})"
     return f"{_name(case)}: {', '.join(parts)}{verdict}"
 

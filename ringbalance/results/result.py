@@ -73,14 +73,15 @@ def models_table(models_used: Iterable[Any], *, tolerance: float) -> Table:
     """Physical terms of a result with their models, without those far below the tolerance.
 
     Args: `models_used`: records with `term`, `model`, `why`, and `estimated_contribution`, relative to the
-        result, None where it is unknown.
+        result, None where it is unknown; their `why`, half of a printed calibration, is left to documents.
     """
     rows = [
-        (each.term, each.model, percent(each.estimated_contribution, digits=3), each.why)
+        (each.term, each.model, percent(each.estimated_contribution, digits=3))
         for each in models_used
         if each.estimated_contribution is None or each.estimated_contribution >= _MIN_CONTRIBUTION * tolerance
     ]
-    return Table(caption="Models used", heads=("term", "model", "contribution", "why"), rows=rows)
+    caption = "Models used; --json and the report say why"
+    return Table(caption=caption, heads=("term", "model", "contribution"), rows=rows)
 
 
 def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:

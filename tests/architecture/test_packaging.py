@@ -130,6 +130,9 @@ def test_each_licence_has_its_text_and_each_transcription_its_licence(
     licences = {entry["SPDX-License-Identifier"] for entry in annotations}
     assert {path.stem for path in (root / "LICENSES").iterdir()} == licences
     assert set(project["project"]["license"].split(" AND ")) == licences
+    assert {*re.findall(r"license: (\S+)", (root / "CITATION.cff").read_text())} == licences
+    named = json.loads((root / "codemeta.json").read_text())["license"]
+    assert {each.rpartition("/")[2] for each in named} == licences
     assert (root / "LICENSE").read_text() == (root / "LICENSES/BSD-3-Clause.txt").read_text()
     stated = {
         str(path.relative_to(root)): match[1].replace(" ", "-")

@@ -47,10 +47,10 @@ def test_verification_is_no_validation() -> None:
 @pytest.mark.parametrize(
     ("name", "readings", "judged", "everything", "left_out"),
     [
-        ("ducts", 125, "107 of 125 points, 97.2 % within", "of all 125 89.6 %", "18 points of a flat duct"),
-        ("laminar_tubes", 69, "42 of 63 points, 100.0 % within", "of all 63 88.9 %", "6 points which gave"),
+        ("ducts", 125, "107 of 125 points, 97.2 % within", "of all 125: 89.6 %", "18 points of a flat duct"),
+        ("laminar_tubes", 69, "42 of 63 points, 100.0 % within", "of all 63: 88.9 %", "6 points which gave"),
         ("rotor", 782, "318 points", "off by up to +4.0 %", "464 points with none"),
-        ("smooth_tubes", 577, "536 of 577 points", "of all 577 92.9 %", "30 points by McKeon"),
+        ("smooth_tubes", 577, "536 of 577 points", "of all 577: 92.9 %", "30 points by McKeon"),
         ("waves", 52, "28 points, 100.0 % within", "bias", "24 points of four"),
     ],
 )

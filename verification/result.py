@@ -231,8 +231,8 @@ class CaseResult(Result):
         title = self.rows().title
         if not apart:
             return title
-        name, found, against, *_ = apart[max(apart)].cells()
-        return plain_text(f"{title}: {name} {found}, to be {against}")
+        name, computed, against, *_ = apart[max(apart)].cells()
+        return plain_text(f"{title}: {name} {computed}, to be {against}")
 
     def to_dict(self) -> Document:
         """The result and all that a report shows of it; SI units, or the unit named beside the number."""

@@ -33,7 +33,7 @@ _STEP_SIGMAS: Final = (0.06, 0.03, 0.015)
 """Standard deviations of the points about the best designs, in the unit cube, and about the best of these."""
 _SIZE_STEPS: Final = (-12, 21)
 """Range of sizes to judge about the expected one, in steps of `AS_SMALL`."""
-_POINTS_PER_SIZE: Final = 24
+_POINTS_PER_SIZE: Final = 16
 _GROWTH_FACTOR: Final = 1.05
 """Ratio of sizes over which the growth of the fraction is taken."""
 _FIRST_LIMIT: Final = 1.05

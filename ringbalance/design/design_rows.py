@@ -21,7 +21,8 @@ from ringbalance.controller.judging.tuning import (
     time_findings,
 )
 from ringbalance.design.axes import Point
-from ringbalance.design.designing import PRESSURE, Design
+from ringbalance.design.designing import Design
+from ringbalance.design.races import PRESSURE
 from ringbalance.design.space import VALVE
 from ringbalance.results.numbers import MISSING, format_given, percent
 from ringbalance.results.requirements import AT_LEAST, MET, MISSED, OPEN

@@ -35,7 +35,6 @@ from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.platform.processes import beside
 
-PRESSURE: Final = "gas.pressure"
 _MOVE_FRACTION: Final = 0.05
 """Relative change of a key, up and down, for its effect."""
 _EFFECT_DEVICES: Final = 256
@@ -130,23 +129,15 @@ class Design(PresentedResult):
         return scene.with_values({path: self.point[path] for path in self.assumed}, origin="assumed")
 
 
-def _in_order(space: Space, designs: Sequence[RacedDesign], needed: float) -> list[RacedDesign]:
-    """Designs by size; if no size varies, by the energy of the gas, those last that a weaker supply stalls.
-
-    Args: `needed`: unbalance to cancel, kg m.
-    """
+def _in_order(space: Space, designs: Sequence[RacedDesign]) -> list[RacedDesign]:
+    """Designs by size; if no size varies, by the energy of the gas, those last that a weak supply stalls."""
     if space.sized:
         return sorted(designs, key=lambda each: each.size)
-    supply = space.scene.gas.pressure
-    weaker = [
-        {**each.point, PRESSURE: (1 - _MOVE_FRACTION) * float(each.point.get(PRESSURE, supply))}
-        for each in designs
-    ]
-    rows = static_rows(space.scene, weaker, intervals=False)
-    stalls = [(row_reach(row) or 0.0) < needed for row in rows]
-    energy = [float(np.nanmedian(each.race.judgement.outcomes.energy)) for each in designs]
-    order = sorted(range(len(designs)), key=lambda i: (stalls[i], energy[i]))
-    return [designs[i] for i in order]
+
+    def cost(each: RacedDesign) -> tuple[bool, float]:
+        return each.weak_reach < 1.0, float(np.nanmedian(each.race.judgement.outcomes.energy))
+
+    return sorted(designs, key=cost)
 
 
 def _size_half_width(fraction: Proportion, slope: float) -> float | None:
@@ -195,7 +186,7 @@ def run_design(
         )
         races, raced = search.races, len(search.races.candidates)
         judged = judged_designs(search)
-        promising = [each for each in _in_order(space, judged, needed) if each.race.succeeded]
+        promising = [each for each in _in_order(space, judged) if each.race.succeeded]
         # If none meets the requirements, the design that serves most devices.
         queue = promising or sorted(judged, key=lambda each: -each.race.judgement.fraction.value)[:1]
         for _ in range(_MAX_VERDICTS):

@@ -37,7 +37,7 @@ POINTS: Final = 2048
 _MAX_LISTED: Final = 256
 """Points up to which a space of lists is tried in full."""
 _FIRST_SMALLEST, _FIRST_SPREAD = 12, 14
-"""Numbers of points in the first races: smallest points that can work, and points spread over all sizes."""
+"""Numbers of points in the first races: smallest points that can work, and points over all sizes."""
 _STEP_SIGMAS: Final = (0.15, 0.15, 0.12, 0.1, 0.08, 0.06)
 """Standard deviation of the steps in the unit cube, by round."""
 _MIN_ROUNDS: Final = 2
@@ -47,12 +47,10 @@ _SIZE_RANGES: Final = ((0.6, 1.1), (0.7, 1.15), (0.8, 1.1), (0.85, 1.1), (0.88, 
 _ANYWHERE_SHARES: Final = (0.5, 0.5, 0.3, 0.3, 0.3, 0.3)
 """Fraction of the points that start at any workable point of the first sample, by round."""
 _RACES_PER_ROUND: Final = 16
-_POINTS_PER_RACE: Final = 32
+_POINTS_PER_RACE: Final = 24
 """Number of points drawn for each race of a round; the most promising one races."""
 _HOPE_SIGMA: Final = 0.7
 """Standard deviations of the surface that are added to its prediction when points are ranked."""
-_DOUBT_SIGMA: Final = 0.5
-"""Standard deviations subtracted from the prediction for a raced design that counts as sufficient."""
 _GAS_SMOOTHING: Final = 0.01
 _MIN_GAS_J: Final = 1e-6
 """Energy of the gas that counts as none, J."""
@@ -157,11 +155,7 @@ def _race_first_sample(races: Races) -> tuple[Static, bool]:
     rows = races.answered(points)
     able = races.able(shares, rows)
     races.wide = np.array([each.shares for each in able])
-    chosen = sorted(able, key=lambda each: each.size)
-    if not complete:
-        rest = chosen[_FIRST_SMALLEST:]
-        spread = np.linspace(0, len(rest) - 1, min(_FIRST_SPREAD, len(rest))).astype(int)
-        chosen = chosen[:_FIRST_SMALLEST] + [rest[i] for i in spread]
+    chosen = _first_races(races, able) if able and not complete else sorted(able, key=lambda each: each.size)
     races.report_progress(f"{len(chosen)} of {len(able)} designs that can work, few devices each")
     races.race(chosen, [None] * len(chosen))
     reach = [(row_reach(row) or 0.0) * (row["status"] == "ok") for row in rows]
@@ -177,6 +171,25 @@ def _race_first_sample(races: Races) -> tuple[Static, bool]:
     return static, complete
 
 
+def _first_races(races: Races, able: Sequence[WorkablePoint]) -> list[WorkablePoint]:
+    """Smallest points, each with the pressure at which it cancels most, and points over all sizes.
+
+    Of every combination of the lists' entries in turn; points that a weak supply stalls, which serve few
+    devices, only where no other is left.
+    """
+    able = sorted(able, key=lambda each: (each.weak_reach < 1.0, each.size))
+    numbers = races.space.combinations(np.array([each.shares for each in able])).tolist()
+    ranks = [numbers[:i].count(number) for i, number in enumerate(numbers)]
+    order = sorted(range(len(able)), key=lambda i: (able[i].weak_reach < 1.0, ranks[i]))
+    smallest, rest = order[:_FIRST_SMALLEST], order[_FIRST_SMALLEST:]
+    smallest.sort(key=lambda i: (ranks[i], numbers[i]))
+    rest = [i for i in rest if able[i].weak_reach >= 1.0] or rest
+    rest.sort(key=lambda i: (numbers[i], ranks[i]))
+    spread = np.linspace(0, len(rest) - 1, min(_FIRST_SPREAD, len(rest))).astype(int).tolist()
+    best = races.able(races.at_best_pressure(np.array([able[i].shares for i in smallest])))
+    return [*best, *(able[rest[i]] for i in spread)]
+
+
 def _race_round(races: Races, size: float, index: int) -> float:
     """Race points about the best designs, the most promising of each range of sizes.
 
@@ -190,14 +203,32 @@ def _race_round(races: Races, size: float, index: int) -> float:
     parents = races.parents(promise, size)
     points = races.cloud(parents, _STEP_SIGMAS[index], sizes, anywhere=_ANYWHERE_SHARES[index])
     if points:
-        values = promise(points)
-        slices = np.array_split(np.arange(values.size), min(_RACES_PER_ROUND, values.size))
-        chosen = [points[each[np.argmax(values[each])]] for each in slices]
+        chosen = [points[i] for i in _most_promising(races, points, promise(points), size)]
         races.race(chosen, races.grid_points(chosen))
-    logits, sigmas = races.surface().logits(races.coordinates(races.candidates))
-    enough = logits - _DOUBT_SIGMA * sigmas >= logit(races.threshold)
-    smallest = min((races.candidates[i].size for i in np.flatnonzero(enough)), default=math.inf)
+    designs = [*races.candidates, *points]
+    enough = races.surface().logits(races.coordinates(designs))[0] >= logit(races.threshold)
+    smallest = min((designs[i].size for i in np.flatnonzero(enough)), default=math.inf)
     return min(max(smallest, low * size), high * size)
+
+
+def _most_promising(
+    races: Races, points: Sequence[WorkablePoint], values: FloatArray, size: float
+) -> list[int]:
+    """Most promising point of each range of sizes: in every second range of the combination of the lists'
+    entries whose turn it is, of those in which a disc no larger than expected may serve enough devices.
+
+    Args: `points`: in the order of their sizes. `values`: promise of each. `size`: expected one, m^3.
+    """
+    numbers = races.space.combinations(np.array([each.shares for each in points]))
+    hopes = (values >= logit(races.threshold)) & (np.array([each.size for each in points]) <= size)
+    hopeful = np.unique(numbers[hopes]).tolist()
+    chosen = []
+    slices = np.array_split(np.arange(values.size), min(_RACES_PER_ROUND, values.size))
+    for count, each in enumerate(slices):
+        turn = numbers[each] == (hopeful[count // 2 % len(hopeful)] if count % 2 and hopeful else -1)
+        eligible = each[turn] if turn.any() else each
+        chosen.append(int(eligible[np.argmax(values[eligible])]))
+    return chosen
 
 
 def _promise(races: Races, surface: Surface, points: Sequence[WorkablePoint]) -> FloatArray:

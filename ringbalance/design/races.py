@@ -24,10 +24,18 @@ from ringbalance.scene.platform.processes import dealt
 
 ReportProgress = Callable[[str], None]
 
+PRESSURE: Final = "gas.pressure"
+_WEAK_SUPPLY: Final = 0.95
+"""Fraction of the gas pressure that a weak supply leaves."""
+_PRESSURES: Final = 8
+"""Number of pressures tried for the largest reach, first of all, then between the neighbours of the best."""
 _POINTS_PER_BATCH: Final = 256
 _DEVICE_BLOCKS: Final = 8
 """Number of blocks of devices that designs use in turn, so that chance in one does not bias the search."""
 _MAX_PARENTS: Final = 6
+_MAX_PARENTS_ALIKE: Final = 2
+"""Parents of each combination of the lists' entries, beside the best of all; three times `_MAX_PARENTS` are
+the most."""
 _NEIGHBOURS_PER_POINT: Final = 2
 """Number of settings that race in addition to those of the nearest design."""
 _SWITCH_PROBABILITY: Final = 0.1
@@ -42,6 +50,8 @@ class WorkablePoint:
     """Coordinates in the unit cube."""
     reach: float
     """Ratio of the unbalance that it cancels in any direction to the needed one."""
+    weak_reach: float
+    """Ratio of both with a weak supply; less than `reach` where liquid then stalls."""
     point: Point
     size: float
     """Volume of the cylinder around the chambers, m^3."""
@@ -103,13 +113,47 @@ class Races:
     def able(self, shares: FloatArray, rows: Sequence[Record] | None = None) -> list[WorkablePoint]:
         """Points that can work. Args: `shares`: coordinates in the unit cube. `rows`: rows without a run."""
         points = self.space.points(shares)
-        rows = self.answered(points) if rows is None else rows
-        reaches = [(row_reach(row) or 0.0) * (row["status"] == "ok") / self.needed for row in rows]
+        reaches = self._reaches(self.answered(points) if rows is None else rows)
+        able = np.flatnonzero(reaches >= self.least).tolist()
+        weak_reaches = self._weak_reaches([points[i] for i in able]).tolist()
         return [
-            WorkablePoint(shares=at, reach=reach, point=point, size=self.space.size(point))
-            for at, reach, point in zip(shares, reaches, points, strict=True)
-            if reach >= self.least
+            WorkablePoint(
+                shares=shares[i],
+                reach=float(reaches[i]),
+                weak_reach=weak_reach,
+                point=points[i],
+                size=self.space.size(points[i]),
+            )
+            for i, weak_reach in zip(able, weak_reaches, strict=True)
         ]
+
+    def _reaches(self, rows: Sequence[Record]) -> FloatArray:
+        """Unbalance that designs cancel, relative to the needed one, from rows without a run."""
+        return np.array([(row_reach(row) or 0.0) * (row["status"] == "ok") / self.needed for row in rows])
+
+    def at_best_pressure(self, shares: FloatArray) -> FloatArray:
+        """Coordinates in the unit cube with the pressure at which the reach with a weak supply is largest."""
+        at = next((i for i, axis in enumerate(self.space.axes) if PRESSURE in axis.ranges), None)
+        if at is None or not len(shares):
+            return shares
+        best = shares.copy()
+        low, high = np.zeros(len(shares)), np.ones(len(shares))
+        for _ in range(2):
+            tried = np.linspace(low, high, _PRESSURES)
+            some = np.repeat(shares[np.newaxis], _PRESSURES, axis=0)
+            some[:, :, at] = tried
+            weak = self._weak_reaches(self.space.points(some.reshape(-1, shares.shape[1])))
+            top = np.argmax(weak.reshape(tried.shape), axis=0)
+            each = np.arange(len(shares))
+            best[:, at] = tried[top, each]
+            low = tried[np.maximum(top - 1, 0), each]
+            high = tried[np.minimum(top + 1, _PRESSURES - 1), each]
+        return best
+
+    def _weak_reaches(self, points: Sequence[Point]) -> FloatArray:
+        supply = self.space.scene.gas.pressure
+        weak = [{**each, PRESSURE: _WEAK_SUPPLY * float(each.get(PRESSURE, supply))} for each in points]
+        return self._reaches(self.answered(weak))
 
     def race(
         self, points: Sequence[WorkablePoint], grid_points: Sequence[Sequence[GridPoint] | None]
@@ -141,10 +185,16 @@ class Races:
         return self.candidates[-1]
 
     def coordinates(self, points: Sequence[WorkablePoint]) -> FloatArray:
-        """Coordinates of the surface: those in the unit cube, and the logarithm of the reach, since the
-        fraction depends more simply on the reach than on the keys behind it."""
+        """Coordinates of the surface: those in the unit cube, the logarithm of the reach, and the reach with
+        a weak supply.
+
+        The fraction depends more simply on what a design cancels than on the keys behind it.  The smallest
+        discs have the least pressure at which no liquid stalls: there the fraction of devices, whose
+        pressures scatter, drops within a few per cent of the pressure, and so does the reach with a weak one.
+        """
         shares = np.array([each.shares for each in points]).reshape(len(points), len(self.space.axes))
-        return np.column_stack([self.space.coordinates(shares), np.log([each.reach for each in points])])
+        reach = [np.log([each.reach for each in points]), np.array([each.weak_reach for each in points])]
+        return np.column_stack([self.space.coordinates(shares), *reach])
 
     def surface(self) -> Surface:
         """Surface fitted to the counts of all candidates."""
@@ -186,7 +236,9 @@ class Races:
         return fields
 
     def parents(self, value: Callable[[Sequence[WorkablePoint]], FloatArray], size: float) -> FloatArray:
-        """Coordinates in the unit cube of the best designs, rescaled to a size, m^3, if size varies."""
+        """Coordinates in the unit cube of the best designs, rescaled to a size, m^3, if it varies; each also
+        with the pressure at which it cancels most.
+        """
         measured = self._well_known
         shares = np.array([each.shares for each in measured])
         if self.space.sized:
@@ -196,7 +248,12 @@ class Races:
             shares, values = np.array([each.shares for each in able]), value(able)
         else:
             values = np.array([each.race.judgement.fraction.value for each in measured])
-        return shares[np.argsort(-values, kind="stable")[:_MAX_PARENTS]]
+        order = np.argsort(-values, kind="stable")
+        numbers = self.space.combinations(shares[order])
+        alike = [np.flatnonzero(numbers == number)[:_MAX_PARENTS_ALIKE] for number in np.unique(numbers)]
+        chosen = np.unique([*range(min(_MAX_PARENTS, order.size)), *np.concatenate(alike)])
+        best = shares[order[chosen[: 3 * _MAX_PARENTS]]]
+        return np.concatenate([best, self.at_best_pressure(best)])
 
     def cloud(
         self, parents: FloatArray, step: float, sizes: FloatArray, *, anywhere: float = 0.0

@@ -12,7 +12,7 @@ import numpy as np
 
 from ringbalance.design.axes import Point, Range, SweepAxis, plan_of_texts
 from ringbalance.design.choices import with_valves
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import COMMAND_LINE, Fault, SceneError
 from ringbalance.scene.keys.derivations import shortest_path
@@ -159,6 +159,14 @@ class Space:
             ],
             axis=1,
         )
+
+    def combinations(self, shares: FloatArray) -> IntArray:
+        """Number of the combination of the lists' entries at coordinates in the unit cube."""
+        numbers = np.zeros(len(shares), dtype=np.intp)
+        for axis, column in zip(self.axes, shares.T, strict=True):
+            if count := len(axis.choices):
+                numbers = count * numbers + np.minimum((column * count).astype(np.intp), count - 1)
+        return numbers
 
     @property
     def parts(self) -> dict[str, SweepAxis]:

@@ -41,7 +41,7 @@ PICTURE: Final = (1200, 800)
 _SCALE: Final = 2
 _DPI: Final = 100
 _PT_PER_PIXEL: Final = 72 / _DPI
-_FONT_PT: Final = 34 * _PT_PER_PIXEL
+_FONT_PT: Final = 46 * _PT_PER_PIXEL
 _MM_PER_M: Final = 1e3
 _WALL_SCALE: Final = 1.002
 """Scale of walls, so that the liquid's sides do not lie in them."""
@@ -340,7 +340,7 @@ def _save(plotter: Any, lettering: _Lettering, theme: _Theme, path: Path) -> Non
         right, up = label.shift
         side = "center" if not up else "bottom" if up > 0 else "top"
         look: Record = {"ha": "center", "va": side, "color": theme.ink, "zorder": 3, "path_effects": halo}
-        look |= {"fontsize": 43 * _PT_PER_PIXEL, "weight": "bold"} if label.strong else {"fontsize": _FONT_PT}
+        look |= {"fontsize": _FONT_PT, "weight": "bold"} if label.strong else {"fontsize": _FONT_PT}
         text = figure.text(0, (y + up) / height, label.text, **look)
         # The text stays whole within the picture; its leader begins at its upper or lower edge.
         half = text.get_window_extent().width / 2 + 5

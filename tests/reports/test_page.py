@@ -209,8 +209,8 @@ def test_no_result_is_typed_into_a_template() -> None:
             # Quotations of the paper are marked as such.
             template = re.sub(r'(?s)<span class="printed">.*?</span>', " ", template)
             text = re.sub(r"(?s)\{[{%#].*?[}%#]\}|<[^>]+>", " ", template)
-            # Nor are numbers of equations, figures and standards, and the levels of a credibility assessment.
-            text = re.sub(r"(?:Eq|Fig)s?\. \d+(?: (?:and|to) \d+)?|API \d+|\b\d ::", " ", text)
+            # Nor are numbers of equations, figures, standards, valves and levels of credibility.
+            text = re.sub(r"(?:Eq|Fig)s?\. \d+(?: (?:and|to) \d+)?|API \d+|\b[35]/2 valve|\b\d ::", " ", text)
             numbers = re.findall(r"(?<![\w-])\d+(?:\.\d+)?(?![\w-])", text)
             # Levels of confidence and numbers of dimensions are no results.
             assert set(numbers) <= {"95", "5", "3"}, (item.name, numbers)

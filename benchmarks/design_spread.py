@@ -1,7 +1,7 @@
 """Spread of the results of `ringbalance design`: the bundled spindle with six free quantities, from several
 starts of the search and with different drawn devices.
 
-python benchmarks/design_spread.py [STARTS [SEEDS]]
+python benchmarks/design_spread.py [START,SEED ...]
 
 A start is the seed of the tried points; a seed is that of the drawn devices (`run.seed`).  Each design is
 checked on devices that no step of its search used.
@@ -9,8 +9,10 @@ checked on devices that no step of its search used.
 
 from __future__ import annotations
 
+import math
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -46,7 +48,8 @@ class Answer:
             f"{', '.join(self.design.space.names(point).values())}"
         )
         return (
-            f"start {self.start}, seed {self.seed}: {1e6 * self.design.size:.1f} ml, {keys}; "
+            f"start {self.start}, seed {self.seed}: {1e6 * self.design.size:.1f} ml, printed "
+            f"{self.design.doubt or math.nan:.1%}, {keys}; "
             f"{self.fraction:.1%} of {CHECKED} further devices; {self.seconds:.0f} s"
         )
 
@@ -64,17 +67,19 @@ def answer(start: int, seed: int) -> Answer:
     return Answer(start=start, seed=seed, design=design, fraction=judgement.fraction.value, seconds=seconds)
 
 
-def main(starts: int = 4, seeds: int = 4) -> None:
-    """Print every result, and largest over smallest size."""
-    for pairs in ([(start, 0) for start in range(starts)], [(0, seed) for seed in range(1, seeds)]):
-        sizes = []
-        for start, seed in pairs:
-            result = answer(start, seed)
-            print(result.text, flush=True)
-            sizes.append(result.design.size)
-        if sizes:
-            print(f"largest over smallest: {max(sizes) / min(sizes) - 1:+.1%}")
+def main(pairs: Sequence[str]) -> None:
+    """Print every result, and how many lie within what they print of their mean."""
+    results = []
+    for pair in pairs:
+        start, seed = map(int, pair.split(","))
+        results.append(answer(start, seed))
+        print(results[-1].text, flush=True)
+    sizes = [each.design.size for each in results]
+    mean = sum(sizes) / len(sizes)
+    inside = sum(abs(each.design.size / mean - 1) <= (each.design.doubt or 0.0) for each in results)
+    print(f"{inside} of {len(sizes)} within what they print of their mean, {1e6 * mean:.1f} ml;", end=" ")
+    print(f"largest over smallest: {max(sizes) / min(sizes) - 1:+.1%}")
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:3]))
+    main(sys.argv[1:] or ["0,0", "1,0", "0,1", "1,1"])

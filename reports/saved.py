@@ -153,7 +153,7 @@ def _kept_file() -> Path:
 
 
 _PACKAGES: Final = (
-    *("numpy", "scipy", "scikit-fem", "pyamg", "fluids", "meshio"),
+    *("numpy", "scipy", "numba", "llvmlite", "scikit-fem", "pyamg", "fluids", "meshio"),
     *("matplotlib", "pyvista", "vtk", "jinja2"),
 )
 _ROOT: Final = Path(__file__).resolve().parents[1]

@@ -124,19 +124,9 @@ def _two_columns(rows: Iterable[tuple[str, str]]) -> RichTable:
     return table
 
 
-def _terminal_table(table: Table) -> RichTable:
-    """A table for a rich console, in keyboard characters."""
-    shown = RichTable(
-        title=table.caption or None,
-        caption=table.note or None,
-        title_justify="left",
-        caption_justify="left",
-        title_style="bold",
-        header_style="bold",
-        box=SIMPLE_HEAD,
-        padding=0,
-        pad_edge=False,
-    )
+def _terminal_table(table: Table) -> Group:
+    """A table for a rich console, in keyboard characters; its texts may be wider than its columns."""
+    shown = RichTable(header_style="bold", box=SIMPLE_HEAD, padding=0, pad_edge=False)
     for number, (head, numeric) in enumerate(zip(table.heads, table.numeric, strict=True)):
         # A name up to this length stays on one line; all other cells wrap.
         name = (
@@ -146,7 +136,8 @@ def _terminal_table(table: Table) -> RichTable:
         shown.add_column(Text(plain(head)), justify=side, no_wrap=name, overflow="fold")
     for row in table.rows:
         shown.add_row(*(Text(plain(cell)) for cell in row))
-    return shown
+    above, below = Text(plain(table.caption), style="bold"), Text(plain(table.note), style="italic dim")
+    return Group(*([above] if table.caption else []), shown, *([below] if table.note else []))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -66,6 +66,13 @@ def test_the_terminal_shows_a_lopsided_interval_and_the_status() -> None:
     assert any(line.split() == ["siphon", "-1.5"] for line in lines)
 
 
+def test_texts_of_a_table_are_as_wide_as_the_output() -> None:
+    note = "where the driven chamber is fuller than its opposite, liquid is lifted over the crest"
+    console = Console(width=120, file=io.StringIO(), record=True)
+    console.print(Rows(title="", quantities=(), tables=(replace(LAW, note=note),)).view())
+    assert note in console.export_text().splitlines()
+
+
 def test_a_number_out_of_range_says_of_what() -> None:
     beyond = Rows(title="", quantities=(replace(STALL, status="out_of_range"),))
     console = Console(width=120, file=io.StringIO(), record=True)

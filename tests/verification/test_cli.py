@@ -71,6 +71,7 @@ def test_a_table_in_a_file_is_not_broken_unless_columns_says_so(
         lines = capsys.readouterr().out.splitlines()
         assert any(line.startswith(f" {row}") for line in lines) == (not columns)
         assert any(line.startswith("consequence") and len(line) > 100 for line in lines) == (not columns)
+        assert not any(line.endswith(" ") for line in lines)
 
 
 def test_the_table_shows_the_limit_that_judged(capsys: pytest.CaptureFixture[str]) -> None:

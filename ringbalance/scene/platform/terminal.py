@@ -47,6 +47,16 @@ class _Terminal(Console):
         if not self.stderr:
             raise BrokenPipeError
 
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print; results in a file or a pipe without the blanks at the ends of a table's lines."""
+        if self.is_terminal or self.stderr:
+            super().print(*objects, **options)
+            return
+        with self.capture() as captured:
+            super().print(*objects, **options)
+        self.file.write("\n".join(line.rstrip(" ") for line in captured.get().split("\n")))
+        self.file.flush()
+
     def render_str(self, text: str, **options: Any) -> Text:
         """Text as the stream writes it, so that columns are as wide as their texts."""
         errors = getattr(self.file, "errors", None) or "strict"

@@ -336,8 +336,9 @@ class Simulation(PresentedResult):
         if self.unreachable_amplitude > limit:
             return Outcome.STALLED
         if state["lost"] or min(state["since"], state["held_since"]) < math.inf:
-            incomplete = Outcome.LIMIT_CYCLE if self.limit_cycle else Outcome.HOLD_INCOMPLETE
-            return Outcome.HOVERING if state["lost"] else incomplete
+            if state["lost"] or self.limit_cycle:
+                return Outcome.HOVERING if state["lost"] else Outcome.LIMIT_CYCLE
+            return Outcome.TOO_MANY_SAMPLES if cause == SAMPLES else Outcome.HOLD_INCOMPLETE
         if self.refused and cause == IDLE:
             return Outcome.CHAMBER_EMPTY
         # The time limit may have cut the first injections short.

@@ -115,7 +115,8 @@ def _warn_of_loop(scene: SceneFile, kind: str) -> None:
     if loop.zone == "D":
         margins = {"gain": loop.margins.gain_factor, "phase": loop.margins.phase}
         state = "near instability" if loop.stable else "unstable"
-        print_message(Finding(code="loop_zone_d", values={"state": state, **margins}).text)
+        for each in (Finding(code="loop_zone_d", values={"state": state, **margins}), *loop.findings):
+            print_message(each.text)
 
 
 def _ring_block(scene: Scene, kind: str) -> tuple[Block, CompactLaw | None]:

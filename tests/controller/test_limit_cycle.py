@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import ringbalance as rb
+from ringbalance.controller.liquid_ring.loop_factor import loop_information
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.loop_records import NOTICEABLE_CHANGE
 from ringbalance.controller.simulation import Outcome, Simulation
@@ -118,6 +119,16 @@ def test_a_run_that_has_just_come_within_its_limit_is_told_to_wait() -> None:
     assert "raise run.time_limit" in run.status
 
 
+def test_a_hold_that_the_most_samples_cut_is_not_laid_to_the_time_limit() -> None:
+    scene, model = machine("liquid_ring_paper")
+    quick = {"period": 5e-3, "hold_time": 5.0, "derivative_time": 0.0}
+    run = simulate(with_tables(scene, controller=quick), model)
+    assert run.state["since"] < run.state["time"] < scene.run.time_limit
+    assert run.outcome is Outcome.TOO_MANY_SAMPLES
+    assert "raise controller.period" in run.status
+    assert "raise run.time_limit" not in run.status
+
+
 @pytest.mark.parametrize("ratio", [0.5, 1.0])
 def test_a_strong_integral_with_a_wrong_lag_is_near_instability(ratio: float) -> None:
     scene, model = machine("grinding_spindle")
@@ -190,3 +201,67 @@ def test_a_gain_near_its_limit_is_near_instability() -> None:
         near = rb.load_scene("grinding_spindle").with_values({"controller.proportional": part * highest})
         findings = simulate(liquid_ring_scene(near), model).findings
         assert ("gain_margin_small" in {each.code for each in findings}) == named
+
+
+def test_a_loop_and_a_run_name_the_same_gain() -> None:
+    scene, model = machine("liquid_ring_paper")
+    high = with_tables(scene, controller={"proportional": 0.12e6})
+    flow_law = rb.calibrate(rb.load_scene("liquid_ring_paper")).flow_law
+    (of_loop,) = (each for each in rb.linear_loop(high, flow_law=flow_law).findings)
+    (of_run,) = (each for each in simulate(high, model).findings if each.code == "gain_too_high")
+    assert of_loop == of_run
+    half = of_loop.values["half"]
+    assert isinstance(half, float)
+    slower = with_tables(scene, controller={"proportional": half})
+    assert rb.linear_loop(slower, flow_law=flow_law).margins.gain_factor == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("error", [43.0, -43.0])
+def test_a_lag_that_takes_the_gain_margin_is_named_before_the_gain(error: float) -> None:
+    scene, model = machine("liquid_ring_paper")
+    wrong = with_tables(scene, controller={"assumed_lag_angle": scene.rotor.lag_angle + math.radians(error)})
+    codes = [each.code for each in simulate(wrong, model).findings]
+    assert codes[1:3] == ["lag_beyond", "gain_too_high"]
+
+
+def test_a_derivative_that_amplifies_noise_is_named() -> None:
+    """From h Td/dt = 1 on; far beyond, a run under noise grows, and one without noise does not."""
+    scene, model = machine("liquid_ring_paper")
+    loop = simulate(scene, model).loop
+    assert loop.value is not None
+    settings = {"period": 5e-3, "derivative_time": 60e-3}
+    fast = with_tables(scene, controller=settings)
+    run = simulate(fast, model)
+    assert run.outcome is Outcome.DIVERGING
+    assert "check_direction" not in {each.code for each in run.findings}
+    (finding,) = (each for each in run.findings if each.code == "derivative_noise")
+    interval = 5e-3 + scene.controller.proportional * scene.controller.limit
+    assert finding.values["answer"] == pytest.approx(loop.value * 60e-3 / interval)
+    still = with_tables(fast, sensor={"amplitude_noise": 0.0, "phase_noise": 0.0})
+    assert simulate(still, model).settled
+    flow_law = rb.calibrate(rb.load_scene("liquid_ring_paper")).flow_law
+    for factor, named in ((0.98, False), (1.02, True)):
+        time = factor * interval / loop.value
+        changed = with_tables(scene, controller={**settings, "derivative_time": time})
+        codes = {each.code for each in rb.linear_loop(changed, flow_law=flow_law).findings}
+        assert ("derivative_noise" in codes) == named
+
+
+def test_margins_of_tune_say_what_they_do_not_cover() -> None:
+    scene, model = machine("grinding_spindle")
+    information, loop = loop_information(scene, model), rb.linear_loop(scene, flow_law=law())
+    (of_loop,) = (each for each in loop.findings if each.code == "integral_short")
+    assert of_loop in information.findings
+
+
+def test_a_margin_near_one_has_three_digits_beyond_it() -> None:
+    scene, model = machine("liquid_ring_paper")
+    highest = simulate(scene, model).loop
+    assert highest.value is not None
+    gain = scene.controller.proportional * highest.limit / highest.value / 1.004
+    near = with_tables(scene, controller={"proportional": gain})
+    information = loop_information(near, model)
+    (margin,) = (each for each in information.quantities if each.key == "gain_margin")
+    assert margin.digits == 4
+    (finding,) = (each for each in information.findings if each.code == "gain_margin_small")
+    assert "with 1.004 times" in finding.text

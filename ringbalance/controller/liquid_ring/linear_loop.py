@@ -26,6 +26,8 @@ from ringbalance.controller.liquid_ring.loop_factor import (
     default_gain,
     loop_margins,
     loop_rate,
+    sampling_interval,
+    short_integral,
     small_margin,
 )
 from ringbalance.physics import balancing
@@ -39,8 +41,6 @@ from ringbalance.scene.registry import registered
 
 AIR_TIME: Final = ("air_time_x", "air_time_y")
 VIBRATION: Final = ("vibration_x", "vibration_y")
-_LEAST_INTEGRAL_STEPS: Final = 5.0
-"""Integral time, in sampling intervals, below which the margins may not hold, see `loop_margins`."""
 _INEXACT: Final = "integral and derivative of the matrices hold only while the residual keeps its direction"
 
 
@@ -56,8 +56,7 @@ class StateSpace:
     outputs: tuple[str, ...]
     states: tuple[str, ...]
     dt: float
-    """Sampling interval of a correction at the limit, s: `period`, the valve's offset and Kc times the limit.
-    With a larger correction the interval, and the integral's part of it, is longer by the valve-open time."""
+    """Sampling interval, s, see `sampling_interval`."""
 
     def to_control(self) -> Any:
         """A `control.StateSpace` with these names. Raises: ImportError: python-control is not installed."""
@@ -91,7 +90,7 @@ class LinearLoop:
     derivative: float
     """q = Td/dt."""
     findings: tuple[Finding, ...]
-    """Findings on a default gain, on small margins and on an integral that they do not cover."""
+    """Findings on a default gain, small or exceeded margins, and a derivative or integral beyond them."""
 
     def __repr__(self) -> str:
         """Results on the loop without its matrices, for JSON."""
@@ -99,7 +98,7 @@ class LinearLoop:
         lines = [
             f"Linear loop, {'stable' if self.stable else 'unstable'}, sampled every {plant.dt:.3g} s "
             "near the limit",
-            f"  gain margin {margins.gain_factor:.3g}, phase margin {math.degrees(margins.phase):.3g} deg",
+            f"  gain margin {margins.gain_factor:.4g}, phase margin {math.degrees(margins.phase):.3g} deg",
             f"  proportional part: disk margin {self.disk_margin:.3g} of 2, "
             f"peak of the sensitivity {self.sensitivity_peak:.3g}, zone {self.zone}",
             *(() if self.proportional_alone else [f"  {_INEXACT}"]),
@@ -178,8 +177,7 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
         problem = f"the controller {scene.controller.kind!r} has no linear loop"
         raise SceneError.of_file(scene.file, problem, 'controller.kind = "target_vector"')
     settings, lag = scene.controller, scene.rotor.lag_angle
-    dt = settings.period + max(settings.offsets(scene.disc.chambers)) + settings.proportional * settings.limit
-    rate = loop_rate(scene, BalancerModel.of(flow_law))
+    dt, rate = sampling_interval(scene), loop_rate(scene, BalancerModel.of(flow_law))
     plant = StateSpace(
         a=np.eye(2),
         b=as_real([[-cmath.rect(rate, -lag)]]),
@@ -218,7 +216,5 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
         derivative=derivative,
         findings=(),
     )
-    findings = [*default_gain(scene), *small_margin(scene, loop.margins)]
-    if integral * _LEAST_INTEGRAL_STEPS > 1.0:
-        findings.append(Finding(code="integral_short", values={"intervals": 1.0 / integral}))
-    return replace(loop, findings=tuple(findings))
+    findings = (*default_gain(scene), *small_margin(scene, loop.margins), *short_integral(scene))
+    return replace(loop, findings=findings)

@@ -43,19 +43,25 @@ from ringbalance.reduced_model.injection.moment import fill_for_moment, tabulate
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio
 from ringbalance.reduced_model.terms import neglected_in_injections
-from ringbalance.results.rows import Finding, Quantity
+from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import FloatArray, finite
 from ringbalance.scene.models import Scene
 
 _FILL_STEP: Final = 1e-4
 """Half the distance over which the slope of a moment is taken, as a fraction of the range of fills."""
 _DEVIATIONS: Final = 3.0
+_NEAR_ONE: Final = 0.1
+"""Distance from one within which numbers have a fourth digit."""
 _SMALL_GAIN_MARGIN: Final = 1.1
 """Gain margin below which a loop is near instability: rotor and flow are seldom known more closely."""
+_TAKEN_BY_LAG: Final = 1.0 / _SMALL_GAIN_MARGIN
+"""Part cos(d) of the gain margin, below which the lag angle has taken a notable part of it."""
 _SMALL_PHASE_MARGIN_RAD: Final = math.radians(10.0)
 """Phase margin likewise: about three times the half-width with which a lag angle is measured."""
 _INTEGRAL_LAG_RAD: Final = math.pi / 4.0
 """Error of the lag angle from which on a loop with an integral part is unstable at any gain."""
+_LEAST_INTEGRAL_STEPS: Final = 5.0
+"""Integral time, in sampling intervals, below which the margins may not hold, see `loop_margins`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,18 +142,57 @@ def short_period(scene: Scene, model: BalancerModel) -> Iterator[Finding]:
         yield Finding(code="period_too_short", values={"period": period, "least": least})
 
 
+def sampling_interval(scene: Scene) -> float:
+    """Sampling interval of a correction at the limit, s: `period`, the valve's offset and Kc times the limit.
+
+    With a larger correction the interval, and the integral's part of it, is longer by the valve-open time.
+    """
+    settings = scene.controller
+    offset = max(settings.offsets(scene.disc.chambers))
+    return settings.period + offset + settings.proportional * settings.limit
+
+
 def small_margin(scene: Scene, margins: Margins | None) -> Iterator[Finding]:
-    """Finding that a loop is near instability, or beyond it by the error of its lag angle."""
-    if margins is None:
+    """Findings that a loop is near instability or beyond it: by its gain, lag angle or derivative.
+
+    The error d of the lag angle leaves the part cos(d) of the gain margin 2 cos(d)/h.  The derivative answers
+    a rise r of the readings, be it noise, with h q r, q = Td/dt: from h q = 1 on with more than the rise.
+    Where a correction reverses the residual, y' = h (1 + q) y - h q y_before - y, and rises grow without end
+    from sqrt(h q) = 1 + sqrt(2 - h) on, where both roots are real and above one.
+    """
+    settings = scene.controller
+    if margins is None or settings.kind != "target_vector":
         return
-    error = abs(math.remainder(scene.controller.assumed_lag_angle - scene.rotor.lag_angle, math.tau))
+    error = abs(math.remainder(settings.assumed_lag_angle - scene.rotor.lag_angle, math.tau))
+    notable, highest = math.cos(error) < _TAKEN_BY_LAG, settings.proportional * margins.gain_factor
     if not margins.stable:
-        if error >= _INTEGRAL_LAG_RAD:
+        if notable:
             yield Finding(code="lag_beyond", values={"error": error})
-    elif margins.gain_factor < _SMALL_GAIN_MARGIN:
-        yield Finding(code="gain_margin_small", values={"factor": margins.gain_factor})
+        if error < _INTEGRAL_LAG_RAD:
+            limit = 2.0 * math.cos(error)
+            loop: dict[str, Value] = {"loop_factor": limit / margins.gain_factor, "loop_factor_limit": limit}
+            gains: dict[str, Value] = {"proportional": highest, "half": highest / 2.0}
+            yield Finding(code="gain_too_high", values=loop | gains)
+        return
+    if margins.gain_factor < _SMALL_GAIN_MARGIN and not notable:
+        values: dict[str, Value] = {"factor": margins.gain_factor, "half": highest / 2.0}
+        yield Finding(code="gain_margin_small", values=values)
     elif margins.phase < _SMALL_PHASE_MARGIN_RAD:
         yield Finding(code="phase_margin_small", values={"phase": margins.phase, "error": error})
+    interval, loop_factor = sampling_interval(scene), 2.0 * math.cos(error) / margins.gain_factor
+    intervals = settings.derivative_time / interval
+    if (answer := loop_factor * intervals) >= 1.0:
+        values = {"intervals": intervals, "answer": answer, "highest": interval / loop_factor}
+        yield Finding(code="derivative_noise", values=values)
+
+
+def short_integral(scene: Scene) -> Iterator[Finding]:
+    """Finding that margins do not cover the integral of the target-vector controller."""
+    time = scene.controller.integral_time
+    if scene.controller.kind == "target_vector" and time is not None:
+        intervals = time / sampling_interval(scene)
+        if intervals < _LEAST_INTEGRAL_STEPS:
+            yield Finding(code="integral_short", values={"intervals": intervals})
 
 
 def vibration_left(scene: Scene, loop: LoopFactor) -> float | None:
@@ -353,7 +398,7 @@ def loop_information(scene: Scene, model: BalancerModel) -> Information:
             ("gas jet", jet_text(scene)),
         ],
         document=document,
-        findings=tuple(small_margin(scene, margins)),
+        findings=(*small_margin(scene, margins), *short_integral(scene)),
     )
 
 
@@ -375,4 +420,5 @@ def _quantities(scene: Scene, loop: LoopFactor, margins: Margins | None) -> Iter
         ]
     for key, name, unit, value in rows:
         if value is not None:
-            yield Quantity(key=key, name=name, unit=unit, value=value, digits=3)
+            digits = 4 if abs(value - 1.0) < _NEAR_ONE else 3
+            yield Quantity(key=key, name=name, unit=unit, value=value, digits=digits)

@@ -51,7 +51,7 @@ _FILL_STEP: Final = 1e-4
 """Half the distance over which the slope of a moment is taken, as a fraction of the range of fills."""
 _DEVIATIONS: Final = 3.0
 _NEAR_ONE: Final = 0.1
-"""Distance from one within which numbers have a fourth digit."""
+"""Distance from one within which factors have a fourth digit."""
 _SMALL_GAIN_MARGIN: Final = 1.1
 """Gain margin below which a loop is near instability: rotor and flow are seldom known more closely."""
 _TAKEN_BY_LAG: Final = 1.0 / _SMALL_GAIN_MARGIN
@@ -420,5 +420,5 @@ def _quantities(scene: Scene, loop: LoopFactor, margins: Margins | None) -> Iter
         ]
     for key, name, unit, value in rows:
         if value is not None:
-            digits = 4 if abs(value - 1.0) < _NEAR_ONE else 3
+            digits = 4 if unit == "1" and abs(value - 1.0) < _NEAR_ONE else 3
             yield Quantity(key=key, name=name, unit=unit, value=value, digits=digits)

@@ -38,7 +38,7 @@ from ringbalance.reports.saved import keep_cases, kept_cases, provenance, versio
 from ringbalance.reports.section import Record, Work, ring_of
 from ringbalance.reports.sections import sections_of
 from ringbalance.results.numbers import format_given, short, with_unit
-from ringbalance.scene import AnyScene, Scene, scene_table
+from ringbalance.scene import AnyScene, Scene, liquid_ring_scene, scene_table
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.keys.declaration import Entries, keys_of
 from ringbalance.scene.keys.fields import ValueReader
@@ -88,7 +88,12 @@ def collect_evidence(
     # Longest jobs first, then short ones: a busy worker does not return the jobs that it has taken.
     jobs = [
         *(job for section in sections.values() for job in section.jobs(work)),
-        Job(name="study", title="Pressure, law and runs", do=study),
+        Job(
+            name="study",
+            title="Pressure, law and runs",
+            needs=("tuning",) if ring_of(scene) else (),
+            do=study,
+        ),
         *cases,
     ]
     # A worker does not know a balancer that was registered in this process.
@@ -144,8 +149,12 @@ def _scene_record(scene: AnyScene, text: str) -> Record:
     }
 
 
-def _ring_study(scene: Scene) -> Record:
-    """Pressure, calibration, both flow laws and a run under each, for several sections."""
+def _ring_study(scene: Scene, tuning: Record) -> Record:
+    """Pressure, calibration, both flow laws and a run under each, for several sections.
+
+    Runs have the scene's settings, or, where it gives no gain, the recommended ones.
+    Args: `tuning`: the job of that name of page 1.
+    """
     field = chamber_field(scene, fill_ratio=scene.disc.max_fill_ratio)
     calibration = calibration_of(scene)
     models = {"calibrated": calibration.model, "paper": paper_model(scene)}
@@ -168,9 +177,10 @@ def _ring_study(scene: Scene) -> Record:
         law.evaluate(fill_ratio=fill[None, :], gas_pressure=np.array(pressures)[:, None])
         for law in (calibration.flow_law, calibration.paper_law)
     )
-    runs = {name: simulate(scene, model).to_dict() for name, model in models.items()}
+    ran = scene if tuning["judged"]["own"] else liquid_ring_scene(tuning["scene"])
+    runs = {name: simulate(ran, model).to_dict() for name, model in models.items()}
     hourly = next(row["value"] for row in runs["calibrated"]["conventions"] if row["key"] == "gas_per_hour")
-    cold = exhaust_cold(scene, gas_per_hour=hourly) if hourly else None
+    cold = exhaust_cold(ran, gas_per_hour=hourly) if hourly else None
     return {
         "limit_m": scene.controller.limit,
         "paper": {

@@ -6,6 +6,8 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from functools import partial
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, Final
 
 import numpy as np
@@ -83,6 +85,7 @@ _RUN: Final = (
     "overshoots",
     "misadjustments",
 )
+_VALVE: Final = ("gas.critical_ratio", "gas.valve_lag")
 _ROTOR: Final = ("rotor.influence_coefficient", "rotor.lag_angle", "rotor.initial_amplitude")
 _GROUNDS: Final[dict[str, Record]] = {
     MET: {"facecolor": THIRD, "alpha": 0.28, "linewidth": 0},
@@ -98,7 +101,8 @@ def _tuning(work: Work) -> Record:
     tuning = tuned(balancer, curve=True, remedies=True)
     chosen = liquid_ring_scene(tuning.scene)
     recommended_run = None
-    if tuning.recommended.settings:
+    # Without settings of the scene's own the run of every section has the recommended ones.
+    if tuning.own is not None and tuning.recommended.settings:
         run = simulate(chosen, work.calibration.model).to_dict()
         recommended_run = {key: run[key] for key in _RUN if key in run} | {
             "injections": len(run["injections"])
@@ -202,18 +206,22 @@ def _view(record: Record, evidence: Record) -> Record:
         # An error of a model in the words of what it acts on.
         "acts_on": {f"{MODEL}{name}": kind.acts_on for name, kind in MODEL_KINDS.items()},
         "borrowed": [path for path in _ROTOR if "default" in (rows.get(path), origins.get(path))],
+        "valve_taken": [
+            row
+            for row in evidence["scene"]["table"]
+            if record.get("valve_given") and row["path"] in _VALVE and row["origin"] in ("assumed", "default")
+        ],
     }
 
 
 def _over_pressure(record: Record) -> Record:
-    """Gas pressures with a verdict, Pa, and the most frequent end of other devices below and above the
-    recommended one."""
+    """Ranges of gas pressure, Pa, in whose levels one verdict holds, and the most frequent end of other
+    devices below and above the recommended pressure."""
     levels = (record.get("along") or {"levels": ()})["levels"]
-    spans = {
-        verdict: [min(values), max(values)]
-        for verdict in (MET, OPEN)
-        if (values := [level["value"] for level in levels if level["verdict"] == verdict])
-    }
+    alike = [(verdict, list(group)) for verdict, group in groupby(levels, itemgetter("verdict"))]
+    spans = [
+        (verdict, group[0]["value"], group[-1]["value"]) for verdict, group in alike if verdict != MISSED
+    ]
     chosen, ends = record["recommended_pressure_Pa"], {"below": Counter[str](), "above": Counter[str]()}
     for level in levels:
         if level["value"] != chosen:

@@ -54,6 +54,8 @@ class Valve:
         Time | None,
         unused("that of the catalogue, else assumed: 20 ms", "time from the command to the valve's motion"),
     ] = None
+    kind: str = ""
+    """Type by the catalogue, which begins with the numbers of ports and positions, such as "5/2"."""
     lowest_pressure: float | None = None
     """Lowest gauge pressure that it takes, Pa."""
     highest_pressure: float | None = None
@@ -105,7 +107,7 @@ def known_valves() -> Mapping[str, Valve]:
         values = {key: parse_quantity(row[key], name) for key, name in dimensions.items() if row[key]}
         values |= {key: float(row[key]) for key in ("critical_ratio", "Cv") if row[key]}
         source = ", ".join(filter(None, (row["source"], row["date"])))
-        valves[row["name"]] = Valve(name=row["name"], source=source, **values)
+        valves[row["name"]] = Valve(name=row["name"], kind=row["type"], source=source, **values)
     return MappingProxyType(valves)
 
 

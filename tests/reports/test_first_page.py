@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from ringbalance.reports.evidence import _ring_study
 from ringbalance.reports.judged import settings_lines
 from ringbalance.reports.page import terminal_lines
 from ringbalance.reports.pages.first_page import SECTION, SETTINGS, _over_pressure, _requirement_record
@@ -145,8 +146,28 @@ def test_pressures_and_the_ends_of_other_devices_are_in_words() -> None:
         {"value": 7e5, "verdict": "undecided", "ended": {"settled": 57, "capacity_exceeded": 7}},
     ]
     view = _over_pressure({"along": {"levels": levels}, "recommended_pressure_Pa": 5e5})
-    assert view["spans"] == {"met": [5e5, 6e5], "undecided": [4e5, 7e5]}
+    # Ranges of different verdicts do not overlap.
+    assert view["spans"] == [("undecided", 4e5, 4e5), ("met", 5e5, 6e5), ("undecided", 7e5, 7e5)]
     assert view["causes"] == {"below": "stalled", "above": "capacity_exceeded"}
+
+
+def test_a_scene_without_a_gain_is_shown_with_the_recommended_settings(paper_scene: Scene) -> None:
+    """The paper's scene stands for one without; others have a limit that needs no injection."""
+    best = paper_scene.with_values({"controller.limit": "1 mm"})
+    for own, injections in ((None, False), ({"verdict": "met"}, True)):
+        loops = _ring_study(paper_scene, {"judged": {"own": own}, "scene": best})["closed_loop"]
+        assert {bool(run["injections"]) for run in loops.values()} == {injections}
+
+
+def test_a_scene_without_a_gain_has_one_column_of_runs(evidence: Record, said: Said) -> None:
+    evidence["summary"]["run"] = {"verdict": "settled"}
+    both = said(evidence, "loop")
+    assert "the scene’s gain" in both
+    assert "recommended settings" in both
+    judged = recommended(evidence)["summary"]
+    alone = said({**evidence, "summary": {**judged, "own": None, "run": None}}, "loop")
+    assert "the scene’s gain" not in alone
+    assert "recommended settings" in alone
 
 
 @pytest.mark.parametrize(
@@ -190,6 +211,21 @@ def test_the_bore_and_the_other_reading_are_named(evidence: Record, said: Said) 
     assert "98 % of devices settle there" in text
     evidence["summary"].update(other_reading=None, bore_uncertainty_stated=True)
     assert "on which k and every velocity rest" not in said(evidence, "summary")
+
+
+def test_what_is_taken_of_the_valve_is_named_with_how_to_judge_it(evidence: Record, said: Said) -> None:
+    row = {"group": "Gas", "note": "", "uncertainty": ""}
+    lag = {**row, "quantity": "valve lag", "path": "gas.valve_lag", "value": "20 ms", "origin": "assumed"}
+    ratio = {**row, "quantity": "b", "path": "gas.critical_ratio", "value": "0.3", "origin": "default"}
+    evidence["scene"]["table"] += [lag, ratio]
+    assert "taken by this program" not in said(evidence, "summary")
+    evidence["summary"]["valve_given"] = True
+    named = "Not stated, and taken by this program: valve lag 20 ms and critical ratio 0.3. Ask the seller; "
+    exact = "they are exact here: valve_lag and critical_ratio in [uncertainty] let the verdict cover their"
+    assert named + exact in said(evidence, "summary")
+    lag["origin"], ratio["uncertainty"] = "given", "0.05"
+    judged = "by this program: critical ratio 0.3. Ask the seller; their [uncertainty] is in the verdict"
+    assert judged in said(evidence, "summary")
 
 
 def test_what_the_scene_leaves_to_the_paper_s_rotor_is_named(evidence: Record, said: Said) -> None:

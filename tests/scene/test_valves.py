@@ -126,6 +126,14 @@ def test_a_pressure_that_the_valve_is_not_made_for_is_said() -> None:
     assert "made for" not in of_paper(valve="Festo MHA2-MS1H-3/2", pressure="8 bar").remark
 
 
+@pytest.mark.parametrize("name", list(known_valves()))
+def test_a_valve_with_two_outlets_needs_one_of_them_plugged(name: str) -> None:
+    ways = known_valves()[name].kind.split()[0]
+    assert ways.strip(",") in ("5/2", "3/2", "two")
+    plugged = "it is a 5/2 valve: one for each chamber, with one outlet plugged"
+    assert (plugged in of_paper(valve=name).remark) is (ways.strip(",") == "5/2")
+
+
 def test_a_lag_that_is_not_stated_is_assumed_and_said() -> None:
     """One rule for each valve, whatever states its flow; a stated lag of 0 is a stated one."""
     flow = {"conductance": "1 l/(s*bar)", "critical_ratio": 0.3}

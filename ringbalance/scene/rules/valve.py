@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Final
 
 from ringbalance.scene.faults import Fault, did_you_mean
 from ringbalance.scene.keys.reading import SceneReading
@@ -15,26 +16,30 @@ from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import format_quantity
 from ringbalance.scene.valves import FLOWS, Valve, find_valve, known_valves
 
+_OF_VALVE: Final = frozenset({"gas.conductance", "gas.critical_ratio", "gas.valve_lag"})
+
 
 def with_valve(reading: SceneReading) -> tuple[SceneReading, tuple[Fault, ...]]:
     """The reading with conductance, critical ratio and lag of its valve; and the errors."""
     at_hand = tuple(_faults_at_hand(reading))
     stated = [key for key in (*FLOWS, "valve") if not reading.lacks(f"gas.{key}")]
+    # Of a valve that cannot be read nothing is known, and nothing further is missing.
+    unread = replace(reading, broken=reading.broken | _OF_VALVE)
     if len(stated) > 1:
         problem = f"{stated[0]} states the flow of the valve already"
         fault = reading.fault(
             f"gas.{stated[1]}", problem=problem, allowed=f"one of {', '.join(FLOWS)}, valve"
         )
-        return reading, (fault, *at_hand)
+        return unread, (fault, *at_hand)
     if not stated or not reading.known(f"gas.{stated[0]}") or "gas.critical_ratio" in reading.broken:
-        return reading, at_hand
+        return unread if stated else reading, at_hand
     (key,) = stated
     value, ratio_stated = reading.values[f"gas.{key}"], reading.values.get("gas.critical_ratio")
     valve = find_valve(value) if key == "valve" else Valve(name="", **{key: value})
     if valve is None:
         problem = f"the catalogue has no valve of that name{did_you_mean(value, known_valves())}"
         allowed = f"{', '.join(known_valves())}; or one of {', '.join(FLOWS)}"
-        return reading, (reading.fault("gas.valve", problem=problem, allowed=allowed), *at_hand)
+        return unread, (reading.fault("gas.valve", problem=problem, allowed=allowed), *at_hand)
     valve = valve if ratio_stated is None else replace(valve, critical_ratio=ratio_stated)
     conductance, ratio = valve.iso_6358
     shown = format_quantity(conductance, "conductance", "l/(s*bar)", digits=3)
@@ -55,10 +60,12 @@ def with_valve(reading: SceneReading) -> tuple[SceneReading, tuple[Fault, ...]]:
 
 
 def _remarks(reading: SceneReading, valve: Valve) -> str:
-    """Source of a valve of the catalogue, and what that does not allow."""
+    """Source of a valve of the catalogue, how it is connected, and what that does not allow."""
     if not valve.source:
         return ""
     text = f"; {valve.source}"
+    if valve.kind.startswith("5/2"):
+        text += "; it is a 5/2 valve: one for each chamber, with one outlet plugged"
     ends, pressure = (valve.lowest_pressure, valve.highest_pressure), reading.values.get("gas.pressure")
     low, high = ends
     if pressure is not None and not (low or 0.0) <= pressure <= (high or math.inf):

@@ -110,8 +110,12 @@ def test_check_balancer_passes(beside: Path) -> None:
 @pytest.mark.parametrize(
     ("last", "said"),
     [
-        ("yield -count * 0.1, 0j", "correction 0j at -0.1 s, after 0.0 s"),
-        ("yield count * 0.1, complex('nan')", "correction (nan+0j) at 0.0 s"),
+        ("yield -count * 0.1, 0j", "correction 0+0j kg m at -0.1 s, after 0 s"),
+        ("yield count * 0.1, complex('nan')", "correction nan+0j kg m at 0 s"),
+        ("yield 1.0 + count, 0j", "correction 0+0j kg m at 1 s"),
+        ("yield count * 0.1, None", "yields (0.0, None)"),
+        ("return; yield", "BallBalancer.corrections yields nothing"),
+        ("1 / 0; yield", "raises ZeroDivisionError: division by zero (balancer.py:"),
     ],
 )
 def test_a_correction_that_cannot_be_is_one_sentence(tmp_path: Path, last: str, said: str) -> None:
@@ -135,5 +139,7 @@ def test_a_correction_that_cannot_be_is_one_sentence(tmp_path: Path, last: str, 
         check=False,
     )
     assert child.returncode == 2
-    assert said in " ".join(child.stderr.split())
+    error = " ".join(child.stderr.split())
+    assert said in error
+    assert "pairs (time in s, complex moment in kg m)" in error
     assert "Traceback" not in child.stderr

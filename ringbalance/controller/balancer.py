@@ -33,6 +33,8 @@ WATCH_TIME_S: Final = 60.0
 """Time for which a run is watched after it has held its limit, s."""
 REQUIRED_FRACTION: Final = 0.9
 """Fraction of the devices that must meet every demand, unless the scene states another."""
+ENERGY_NONE: Final = "energy_none"
+"""Energy kind of a balancer that states no energy."""
 ROTOR_AMPLITUDE: Final = "rotor_amplitude"
 """Code of the demand of `rotor_within`."""
 Settings = Mapping[str, Any]

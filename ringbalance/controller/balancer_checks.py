@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import AS_GIVEN, Balancer, Draws, Outcomes, balancer_of
+from ringbalance.controller.standard_balancer import StandardBalancer, StandardRun
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding
 from ringbalance.scene.faults import SceneError
@@ -63,11 +64,18 @@ def stated_settings(balancer: Balancer) -> Iterator[str]:
 
 
 def effects(balancer: Balancer) -> Iterator[str]:
-    """A setting, 1.3 times as large, has an effect."""
+    """A setting, 1.3 times as large, has an effect, as the spread of each uncertain input has."""
     stated = balancer.run({}, AS_GIVEN, trace=True)
     changed = ({each.path: 1.3 * each.value} for each in balancer.settings())
     if not any(_differ(balancer.run(each, AS_GIVEN, trace=True), stated) for each in changed):
         yield "no setting has one"
+    if not isinstance(balancer, StandardBalancer):
+        return
+    scene, drawn = balancer.scene, balancer.run({}, Draws.first(3))
+    for each in scene.uncertainty:
+        rest = tuple(other for other in scene.uncertainty if other is not each)
+        if not _differ(balancer.on_scene(replace(scene, uncertainty=rest)).run({}, Draws.first(3)), drawn):
+            yield f"{each.quantity} has none on a drawn device"
 
 
 def repeatable(balancer: Balancer) -> Iterator[str]:
@@ -147,7 +155,7 @@ def rotor(balancer: Balancer) -> Iterator[str]:
 
 
 def reach(balancer: Balancer) -> Iterator[str]:
-    """Runs cancel nine tenths of the stated reach in any direction, and no more than it in the worst."""
+    """Runs cancel nine tenths of the stated reach in any direction, no more in the worst, and hold a peak."""
     stated = next((each.value for each in balancer.quantities() if each.key == "reach"), None)
     if stated is None or not 0 < stated < math.inf:
         yield f"the quantity reach is {stated}"
@@ -168,12 +176,30 @@ def reach(balancer: Balancer) -> Iterator[str]:
     sizes = {abs(common.unbalance), 2 * stated + 2 * small}
     if (cancelled := max(size - max(left(size)) for size in sizes)) > 1.1 * stated:
         yield f"the reach is {stated:.4g} kg m, and runs cancel {cancelled:.3g} kg m in any direction"
+    # In some directions a balancer may form more than its reach; what it forms on the way it also holds.
+    (traced,) = balancer.run({}, AS_GIVEN, trace=True).traced
+    if not isinstance(traced.run, StandardRun):
+        return
+    peak = complex(max(traced.run.correction, key=abs))
+    if abs(peak) > 1.1 * stated:
+        against = replace(common, unbalance=-0.9 * peak)
+        run = balancer.on_rotor(against).run({}, AS_GIVEN)
+        if run.final_amplitude[0] / abs(common.influence) > small:
+            yield f"the reach is {stated:.4g} kg m, and a run passes through {abs(peak):.4g} kg m"
 
 
 def span(balancer: Balancer) -> Iterator[str]:
-    """Runs last as long as is asked for."""
+    """Runs last as long as is asked for, and measure as often as is stated."""
     if not math.isclose(reached := balancer.lasting(_SPAN_S).span(), _SPAN_S):
         yield f"{reached} s in place of {_SPAN_S} s"
+    stated = balancer.sampling_time()
+    if not 0 <= stated < math.inf:
+        yield f"the sampling time is {stated:.4g} s"
+        return
+    (traced,) = balancer.run({}, AS_GIVEN, trace=True).traced
+    steps = np.diff(np.unique(traced.run.measured)) if isinstance(traced.run, StandardRun) else ()
+    if len(steps) and not min(steps) * (1 - 1e-6) <= stated <= max(steps) * (1 + 1e-6):
+        yield f"the sampling time is {stated:.4g} s, and runs measure every {np.median(steps):.4g} s"
 
 
 def pickles(balancer: Balancer) -> Iterator[str]:
@@ -230,12 +256,20 @@ CHECKS: Final[tuple[Check, ...]] = (
 """Each is called with the balancer of a scene that was read."""
 
 
+class Raised(str):
+    """Problem that ended a check."""
+
+    __slots__ = ()
+
+
 def problems_of(check: Check, balancer: Balancer) -> tuple[str, ...]:
     """Problems that a check finds; an exception is one of them."""
     try:
         return tuple(check(balancer))
+    except SceneError as error:
+        return (Raised(error),)
     except Exception as error:  # Whatever another package raises is the result of the check.
-        return (f"{type(error).__name__}: {error}",)
+        return (Raised(f"{type(error).__name__}: {error}"),)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -253,18 +287,27 @@ class BalancerChecks(Result):
         """True if every check passes."""
         return not any(problems for _, problems in self.problems)
 
+    def _states(self) -> Iterator[tuple[Check, str, str]]:
+        """Each check with its state and what is wrong; what ended several checks is said once."""
+        said = set()
+        for check, problems in self.problems:
+            if problems and isinstance(problems[0], Raised) and problems in said:
+                yield check, "not reached", ""
+            else:
+                yield check, "failed" if problems else "passed", "; ".join(problems)
+            said.add(problems)
+
     def _finding(self) -> Finding:
         values: dict[str, Any] = {"name": self.name, "count": len(self.problems), "source": self.source}
-        if failed := sum(bool(problems) for _, problems in self.problems):
-            return Finding(code="balancer_unsound", values={**values, "failed": failed})
-        return Finding(code="balancer_sound", values=values)
+        states = [state for _, state, _ in self._states()]
+        values |= {"failed": states.count("failed"), "unreached": states.count("not reached")}
+        if values["unreached"]:
+            return Finding(code="balancer_unreached", values=values)
+        return Finding(code="balancer_unsound" if values["failed"] else "balancer_sound", values=values)
 
     def rows(self) -> Rows:
         """Verdict, and a line for each check."""
-        lines = [
-            (f"{check.__doc__}", "failed" if problems else "passed", "; ".join(problems))
-            for check, problems in self.problems
-        ]
+        lines = [(f"{check.__doc__}", state, problem) for check, state, problem in self._states()]
         table = Table(heads=("must hold", "", "problem"), rows=lines)
         title = f"Balancer {self.name}"
         return Rows(title=title, quantities=(), findings=(self._finding(),), tables=(table,))

@@ -15,7 +15,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import ROTOR_AMPLITUDE, Balancer, Demand, Draws, Outcomes, Settings
+from ringbalance.controller.balancer import (
+    ENERGY_NONE,
+    ROTOR_AMPLITUDE,
+    Balancer,
+    Demand,
+    Draws,
+    Outcomes,
+    Settings,
+)
 from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE, plain_settings
 from ringbalance.controller.judging.search import searched
 from ringbalance.controller.rotor import (
@@ -98,6 +106,8 @@ class Side:
         return [float(values.min()), float(values.max())] if values.size else None
 
     def _of_settled(self, name: str) -> FloatArray:
+        if name == "energy" and self.energy_kind == ENERGY_NONE:
+            return np.zeros(0)
         values = self.residual_ratio if name == "residual_ratio" else getattr(self.outcomes, name)
         return np.asarray(values[self.outcomes.settled])
 
@@ -114,6 +124,7 @@ class Side:
             yield Quantity.of_fraction(rotors, key=f"{prefix}fraction_rotor", name=name)
         for _, name, key, words, unit in _DEVICE_NUMBERS:
             low, high = self.ends(name) or (None, None)
+            status = "ok" if self.outcomes.settled.any() else "not_settled"
             yield Quantity(
                 key=prefix + key,
                 name=words,
@@ -122,7 +133,7 @@ class Side:
                 lower=low,
                 upper=high,
                 origin="simulated",
-                status="ok" if self.outcomes.settled.any() else "not_settled",
+                status=ENERGY_NONE if name == "energy" and self.energy_kind == ENERGY_NONE else status,
             )
         yield Quantity(
             key=f"{prefix}worst_amplitude",
@@ -182,7 +193,7 @@ class Comparison(Result):
         return tuple(side.fraction.verdict(self.asked) for side in self.sides)
 
     def to_dict(self) -> dict[str, Any]:
-        """The comparison as a JSON document, SI; lists run along `scenes`; null: no device settles."""
+        """The comparison as JSON, SI; lists run along `scenes`; null: none settles, or none stated."""
         sides, rotor = self.sides, self.rotor
         numbers = [(key, name) for key, name, *_ in _DEVICE_NUMBERS]
         return {

@@ -8,14 +8,18 @@ from __future__ import annotations
 
 import cmath
 import math
+import numbers
+import traceback
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Self, get_type_hints
 
 import numpy as np
 
 from ringbalance.controller.balancer import (
+    ENERGY_NONE,
     Balancer,
     Draws,
     Outcomes,
@@ -48,6 +52,7 @@ from ringbalance.scene.uncertain import NORMAL_95
 _SETTING_FACTOR: Final = 30.0
 """Largest factor on a setting that is tried, up and down."""
 _SETTING_LEVELS: Final = 9
+_MOVES: Final = "pairs (time in s, complex moment in kg m), the first at 0 s, finite, at times that increase"
 Measure = Callable[[complex], complex]
 """Measured vibration, m, under a correction, kg m, both complex in the rotor's frame."""
 
@@ -125,6 +130,8 @@ class StandardRun:
     """kg m, in the rotor's frame."""
     limit: float
     """Amplitude to come below, m."""
+    measured: tuple[float, ...] = ()
+    """Instants of the measurements, s."""
     findings: tuple[Finding, ...] = ()
     """The end of the run first."""
 
@@ -170,7 +177,7 @@ class StandardBalancer(Balancer):
     noise of its own.
     """
 
-    energy_kind = "energy_none"
+    energy_kind = ENERGY_NONE
     scene: Any
     """Scene, a `StandardScene`."""
     setting_paths: ClassVar[tuple[str, ...]] = ()
@@ -197,7 +204,7 @@ class StandardBalancer(Balancer):
         return ()
 
     def energy(self, run: StandardRun, device: Any) -> float:  # noqa: ARG002
-        """Energy that a run took, J."""
+        """Energy that a run took, J; shown where `energy_kind` is the code of another sentence."""
         return 0.0
 
     def check_rotor(self, rotor: CommonRotor) -> None:
@@ -265,19 +272,34 @@ class StandardBalancer(Balancer):
         rotor, noise, span = device.rotor, device.vibration.noise, float(device.run.time_limit)
         unbalance = cmath.rect(rotor.unbalance, rotor.phase)
 
+        moves: list[tuple[float, complex]] = []
+        measured: list[float] = []
+
         def measure(correction: complex) -> complex:
+            measured.append(moves[-1][0] if moves else 0.0)
             parts = random.standard_normal(2)
             return complex(rotor.influence * (unbalance + correction) + noise * complex(*parts))
 
-        moves: list[tuple[float, complex]] = []
-        for time, correction in self.corrections(device, assumed=assumed, measure=measure):
-            last = moves[-1][0] if moves else -math.inf
-            if not (time > last and cmath.isfinite(correction)):
-                problem = f"its balancer gives the correction {correction} at {time} s, after {last} s"
-                raise SceneError.of_file(assumed.file, problem, "finite corrections at times that increase")
-            if time > span:
-                break
-            moves.append((time, correction))
+        try:
+            for move in self.corrections(device, assumed=assumed, measure=measure):
+                if not _is_move(move):
+                    raise self._wrong(f"yields {move!r}")
+                time, correction = float(move[0]), complex(move[1])
+                after = f", after {moves[-1][0]:z.4g} s" if moves else ""
+                due = time > moves[-1][0] if moves else time == 0
+                if not (due and cmath.isfinite(correction)):
+                    raise self._wrong(f"yields the correction {correction:.4g} kg m at {time:z.4g} s{after}")
+                if time > span:
+                    break
+                moves.append((time, correction))
+        except SceneError:
+            raise
+        except Exception as error:  # Whatever another package raises.
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            problem = f"raises {type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
+            raise self._wrong(problem) from error
+        if not moves:
+            raise self._wrong("yields nothing")
         if moves[-1][0] < span:
             moves.append((span, moves[-1][1]))
         times, corrections = (np.array(column) for column in zip(*moves, strict=True))
@@ -287,6 +309,7 @@ class StandardBalancer(Balancer):
             vibration=rotor.influence * (unbalance + corrections),
             correction=corrections,
             limit=device.vibration.limit,
+            measured=tuple(measured),
         )
         end = {"final_amplitude": float(run.amplitude[-1]), "limit": run.limit, "time": span}
         if run.settled:
@@ -296,6 +319,10 @@ class StandardBalancer(Balancer):
         else:
             ended = Finding(code="above_limit", values=end)
         return replace(run, findings=(ended, *self.findings(run, device)))
+
+    def _wrong(self, problem: str) -> SceneError:
+        name = f"{type(self).__module__}.{type(self).__qualname__}.corrections"
+        return SceneError.of_file(self.scene.file, f"{name} {problem}", _MOVES)
 
     def rotor(self, number: int | None = None) -> CommonRotor:
         scene = self.scene
@@ -320,7 +347,7 @@ class StandardBalancer(Balancer):
         return type(self)(replace(_on(self.scene, rotor), vibration=vibration), rotors)
 
     def sampling_time(self) -> float:
-        """Time between two samples, s; 0: the balancer measures nothing, or at all times."""
+        """Time between two instants at which `corrections` measures, s; 0: it measures nothing."""
         return 0.0
 
     def lasting(self, span: float) -> Self:
@@ -354,6 +381,12 @@ class StandardBalancer(Balancer):
             "correction_kg_m": np.abs(run.correction).tolist(),
             "correction_angle_rad": np.angle(run.correction).tolist(),
         }
+
+
+def _is_move(move: object) -> bool:
+    """True for a pair of a real and a complex number, of Python or NumPy."""
+    kinds = (numbers.Real, numbers.Complex)
+    return isinstance(move, Sequence) and len(move) == 2 and all(map(isinstance, move, kinds))
 
 
 def _on(scene: Any, rotor: CommonRotor) -> Any:

@@ -141,6 +141,67 @@ def test_a_false_reach_is_told_from_the_runs(
     assert said in " ".join(problems)
 
 
+TRUE_CORRECTIONS = BallBalancer.corrections
+
+
+def _measures(self: BallBalancer, device: BallScene, *, measure: Any, **options: Any) -> Any:
+    for number in range(200):
+        yield 0.1 * number, 0j
+        measure(0j)
+
+
+def _passes(self: BallBalancer, device: BallScene, **options: Any) -> Any:
+    for number, (time, correction) in enumerate(TRUE_CORRECTIONS(self, device, **options)):
+        yield time, 50 * TRUE_REACH(self, device) if number == 5 else correction
+
+
+def _as_assumed(self: BallBalancer, device: BallScene, *, assumed: BallScene, **options: Any) -> Any:
+    return TRUE_CORRECTIONS(self, replace(device, balls=assumed.balls), assumed=assumed, **options)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "said"),
+    [
+        ("span", {"sampling_time": lambda self: -1.0}, ("the sampling time is -1 s",)),
+        ("span", {"corrections": _measures}, ("the sampling time is 0 s, and runs measure every 0.1 s",)),
+        ("span", {"corrections": _measures, "sampling_time": lambda self: 0.1}, ()),
+        (
+            "reach",
+            {"corrections": _passes},
+            ("the reach is 0.0001 kg m, and a run passes through 0.005 kg m",),
+        ),
+        (
+            "effects",
+            {"corrections": _as_assumed},
+            ("balls.mass has none on a drawn device", "balls.drag has none on a drawn device"),
+        ),
+    ],
+)
+def test_a_false_statement_is_told_from_the_runs(
+    balls: BallScene,
+    name: str,
+    changes: dict[str, Any],
+    said: tuple[str, ...],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for attribute, value in changes.items():
+        monkeypatch.setattr(BallBalancer, attribute, value)
+    (check,) = (check for check in CHECKS if check.__name__ == name)
+    assert problems_of(check, BallBalancer(balls)) == said
+
+
+def test_an_error_of_every_run_is_said_once(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(BallBalancer, "corrections", lambda self, device, **options: iter(()))
+    assert main(["check-balancer", "ball"]) == 1
+    text = " ".join(capsys.readouterr().out.split())
+    assert "fails 1 of 18 checks" in text
+    assert "its error keeps 11 more from being reached" in text
+    assert text.count("yields nothing") == 1
+    assert text.count("not reached") == 11
+
+
 @pytest.mark.parametrize("scene", ["liquid_ring_paper", "six_chamber", "driven_masses_small"])
 def test_the_reach_of_the_programs_own_balancers_is_what_their_runs_cancel(scene: str) -> None:
     assert problems_of(reach, balancer_of(load_scene(bundled_scene(scene)))) == ()
@@ -199,6 +260,10 @@ def test_the_third_balancer_is_compared(balls: BallScene) -> None:
     assert result["sampling_time_s"] == [None, ring.sampling_time()]
     (sampled,) = [each for each in result["quantities"] if each["key"] == "1.sampling_time"]
     assert (sampled["value"], sampled["status"]) == (None, "not_sampled")
+    # And state no energy.
+    (energy,) = [each for each in result["quantities"] if each["key"] == "1.energy"]
+    assert (energy["value"], energy["status"]) == (None, "energy_none")
+    assert (result["energy_J"][0], result["spread"][0]["energy_J"]) == (None, None)
     with pytest.raises(rb.SceneError, match="below the critical speed"):
         compare(ring, balancer_of(balls), rotor="first")
 

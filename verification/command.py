@@ -120,18 +120,25 @@ def _print_judgement(document: Mapping[str, Any]) -> None:
         )
         for name, each in series.items()
     ]
+    middle, most = (percent(document["half_width"][key]) for key in ("median", "largest"))
+    accuracy = f"known to {middle} in the median, {most} at most (95 %)"
+    hints = [document["hint"]] if document["hint"] else []
     title = f"{document['title']}  {document['verdict']} ({document['source']})"
     if display().brief:
         _, points, bias, within = lines[-1]
         numbers = f"{points} points, bias {bias}, {within} within both intervals"
-        text = summary_text([title, numbers, *filter(None, [document["hint"]])])
+        text = summary_text([title, numbers, f"predictions are {accuracy}", *hints, *document["remarks"]])
         results_console().print(text, markup=False, highlight=False)
         return
     rows = Rows(
         title=title,
         quantities=(),
-        facts=[("rule", f"confirmed where at least {percent(document['limit'])} lie within both intervals")]
-        + ([("but", document["hint"])] if document["hint"] else []),
+        facts=[
+            ("rule", f"confirmed where at least {percent(document['limit'])} lie within both intervals"),
+            ("predictions", accuracy),
+            *(("but", hint) for hint in hints),
+            *(("read", remark) for remark in document["remarks"]),
+        ],
         tables=(Table(heads=("series", "points", "bias", "within"), rows=lines),),
         listed=0,
     )

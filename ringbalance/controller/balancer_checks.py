@@ -71,10 +71,10 @@ def effects(balancer: Balancer) -> Iterator[str]:
         yield "no setting has one"
     if not isinstance(balancer, StandardBalancer):
         return
-    scene, drawn = balancer.scene, balancer.run({}, Draws.first(3))
+    scene, outcomes = balancer.scene, balancer.run({}, Draws.first(3))
     for each in scene.uncertainty:
         rest = tuple(other for other in scene.uncertainty if other is not each)
-        if not _differ(balancer.on_scene(replace(scene, uncertainty=rest)).run({}, Draws.first(3)), drawn):
+        if not _differ(balancer.on_scene(replace(scene, uncertainty=rest)).run({}, Draws.first(3)), outcomes):
             yield f"{each.quantity} has none on a drawn device"
 
 

@@ -295,8 +295,8 @@ class StandardBalancer(Balancer):
         except SceneError:
             raise
         except Exception as error:  # Whatever another package raises.
-            place = traceback.extract_tb(error.__traceback__)[-1]
-            problem = f"raises {type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
+            frame = traceback.extract_tb(error.__traceback__)[-1]
+            problem = f"raises {type(error).__name__}: {error} ({Path(frame.filename).name}:{frame.lineno})"
             raise self._wrong(problem) from error
         if not moves:
             raise self._wrong("yields nothing")

@@ -114,6 +114,12 @@ def observations_of(
     for head in table.heads:
         remarks += _turned(head, kind, columns, speed)
     uncertainty, stated_faults = _stated_uncertainty(table, kind, columns, speed)
+    # A cell with an error has no value that a relative uncertainty could be of.
+    bad = {fault.key.split(",")[0] for fault in cell_faults}
+    stated_faults = [fault for fault in stated_faults if fault.key not in bad]
+    by_columns = [each.name for each in kind.uncertainties() if each.name in columns]
+    if by_columns and _UNCERTAINTY in table.header:
+        remarks += (f"of the key uncertainty and the column {', '.join(by_columns)}, the column is taken",)
     wrong += [*cell_faults, *_faults_of_scene(table, kind, scene, columns), *stated_faults]
     if wrong:
         return None, tuple(wrong)

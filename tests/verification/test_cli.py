@@ -176,6 +176,58 @@ def test_a_file_of_measurements_is_predicted_and_judged(
     words = " ".join(capsys.readouterr().out.split())
     assert "refuted (rig 4)" in words
     assert "rule confirmed where at least" in words
+    assert "predictions known to" in words
+
+
+_FRICTION = '# kind = "friction"\n# source = "rig 5"\n# uncertainty = "1 %"\n'
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "verdict", "hint", "remarks"),
+    [
+        # 30 % above 64/Re, where the program allows for early transition.
+        ("", [(re, 1.3 * 64 / re) for re in (1850, 1900, 1950, 2000)], "confirmed", "only because", 0),
+        ("", [(re, 64 / re) for re in (300, 500, 900)], "confirmed", "", 0),
+        ("", [(re, 16 / re) for re in (300, 500, 900)], "refuted", "these are Fanning's", 0),
+        (
+            ",series",
+            [(500, 0.032, "b"), (900, 16 / 900, "b"), (400, 0.16, "a")],
+            "refuted",
+            "those of b are",
+            0,
+        ),
+        (",uncertainty [%]", [(300, 64 / 300, 2), (500, 64 / 500, 2)], "confirmed", "", 1),
+    ],
+)
+def test_a_judgement_says_what_it_rests_on(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    head: str,
+    rows: list[tuple[float | str, ...]],
+    verdict: str,
+    hint: str,
+    remarks: int,
+) -> None:
+    path = tmp_path / "tube.csv"
+    lines = "".join(",".join(map(str, row)) + "\n" for row in rows)
+    path.write_text(f"{_FRICTION}reynolds,friction_factor{head}\n{lines}", encoding="utf-8")
+    assert run_command("verify", data=[path], json=True) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["verdict"] == verdict
+    assert hint in document["hint"]
+    assert bool(hint) == bool(document["hint"])
+    assert len(document["remarks"]) == remarks
+    shares = [each["stated"] / each["predicted"] for each in document["points"]]
+    assert document["half_width"]["largest"] == pytest.approx(max(shares))
+
+
+def test_a_cell_with_an_error_has_no_second_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "tube.csv"
+    path.write_text(_FRICTION + "reynolds,friction_factor\n300,nan\n500,abc\n900,0\n", encoding="utf-8")
+    assert main(["verify", "--data", str(path)]) == 2
+    error = capsys.readouterr().err
+    assert error.count("tube.csv: line") == 3
+    assert "relative" not in error
 
 
 @pytest.mark.parametrize(

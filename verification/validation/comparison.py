@@ -29,6 +29,8 @@ MUTATIONS: Final[Mapping[str | None, float]] = MappingProxyType(
     {None: 1.0, "ten_per_cent_high": 1.1, "ten_per_cent_low": 0.9}
 )
 """Factors on the prediction; every comparison with measurements must detect the last two."""
+_TOLD: Final = 0.1
+"""Relative half-width beyond which a prediction may hide an error that the comparisons must detect."""
 _MIN_POINTS: Final = 2
 """Least number of points of a user's file, from which a scatter can be calculated."""
 _MIN_SERIES: Final = 3
@@ -238,6 +240,12 @@ def data_evidence(*sets: Observations, unit: str, mutation: str | None = None) -
     )
 
 
+def _fourfold(points: Predictions) -> bool:
+    """True where values are refuted that are confirmed four times as large."""
+    fourfold = dataclasses.replace(points, measured=4 * points.measured)
+    return (points.verdict, fourfold.verdict) == (Verdict.REFUTED, Verdict.CONFIRMED)
+
+
 def data_document(path: Path) -> dict[str, Any]:
     """Judgement of a file of measurements, as `ringbalance verify --data FILE --json` prints it.
 
@@ -249,13 +257,21 @@ def data_document(path: Path) -> dict[str, Any]:
         raise SceneError.of_file(
             data.file, f"{len(data)} point, and {_MIN_POINTS} are the fewest that can be judged"
         )
-    verdicts = [dataclasses.replace(points, measured=n * points.measured).verdict for n in (1, 4)]
-    fanning = data.kind == "friction" and verdicts == [Verdict.REFUTED, Verdict.CONFIRMED]
-    hint = "these are Fanning's factors: four times as large, as Darcy's, they are confirmed"
-    series = {}
+    series: dict[str, dict[str, float]] = {}
+    fanning = []
     for name in np.unique(points.series).tolist():
         part = points.where(points.series == name)
         series[name] = {"points": part.measured.size, "bias": part.bias, "share_within": part.share_within}
+        fanning += [name] if data.kind == "friction" and _fourfold(part) else []
+    hint = ""
+    if fanning or (data.kind == "friction" and _fourfold(points)):
+        of_all = _fourfold(points) or len(fanning) == len(series)
+        whose = "these are" if of_all else f"those of {', '.join(fanning)} are"
+        hint = f"{whose} Fanning's factors: four times as large, as Darcy's, they are confirmed"
+    widths = points.stated / points.predicted
+    sure = dataclasses.replace(points, stated=np.minimum(widths, _TOLD) * points.predicted)
+    if points.verdict is Verdict.CONFIRMED and sure.verdict is Verdict.REFUTED:
+        hint = "confirmed only because predictions are uncertain: known to 10 % each, they would be refuted"
     return {
         "file": str(path),
         "kind": data.kind,
@@ -264,7 +280,9 @@ def data_document(path: Path) -> dict[str, Any]:
         "measured": kind.measured[0].name,
         "limit": PROMISED,
         "verdict": points.verdict.value,
-        "hint": hint if fanning else "",
+        "hint": hint,
+        "remarks": list(data.remarks),
+        "half_width": {"median": float(np.median(widths)), "largest": float(np.max(widths))},
         "statistics": points.statistics,
         "series": series,
         "points": [

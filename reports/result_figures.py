@@ -109,8 +109,12 @@ def _comparison(result: Any) -> list[Drawing]:
 
 def _design(result: Any) -> list[Drawing]:
     """Fraction of devices and gas pressure of the designs that ran, over their volume, or over the gas where
-    no volume varies: those with a verdict on many devices large, the chosen one in a ring."""
-    space, judged = result.space, [(each, each.race.judgement) for each in result.tried]
+    no volume varies: those with a verdict on many devices large, the chosen one, as printed, in a ring."""
+    space = result.space
+    judged = [
+        (each, result.judgement if each.point == result.point else each.race.judgement)
+        for each in result.tried
+    ]
     if not judged:
         return []
     across = ("volume of the cylinder around the chambers", "m^3") if space.sized else ("gas, median", "J")

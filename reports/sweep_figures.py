@@ -40,7 +40,7 @@ from ringbalance.reports.figures_page import READING_FILE, ReadableFigure, Readi
 from ringbalance.reports.prose import input_name, opening, typeset
 from ringbalance.results.numbers import display_unit
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
-from ringbalance.scene.describe import usual_name
+from ringbalance.scene.describe import setting_text, usual_name
 from ringbalance.scene.platform.files import write_whole
 
 COLUMNS: Final = MappingProxyType(
@@ -89,8 +89,8 @@ class View:
     """Keys of one or two axes."""
     shown: BoolArray
     """Mask of the points; in a grid of more axes the others have the values of one row."""
-    note: str
-    """Values of the other axes; empty: all points are shown."""
+    held: str
+    """Names and values of the other axes; empty: all points are shown."""
 
     def keys(self) -> list[FloatArray]:
         """Values of the keys at the points shown, SI."""
@@ -139,7 +139,7 @@ def _page(views: list[View], drawings: list[Drawing]) -> str:
         caption = f"{opening(words)}."
         figures.append(ReadableFigure(drawing=drawing, label=label, caption=caption, curves=[(x, y)]))
     best = np.flatnonzero(np.flatnonzero(view.shown) == sweep.best_or_nearest)
-    note = f" {opening(view.note)}." if view.note else ""
+    note = f" {opening(view.held)}, as in row {sweep.best_or_nearest or 0}." if view.held else ""
     return figures_page(
         sweep.scene.name,
         f"Sweep of {sweep.scene.source}, {len(sweep.points)} points.{note}",
@@ -198,18 +198,24 @@ def _view(sweep: Sweep, fields: dict[str, SweepColumn], name: str, axes: list[Sw
     )
     most = [axes[i] for *_, i in ranked[:2]]
     paths = tuple(axis.head for axis in axes if axis in most)
-    shown, note = np.ones(len(sweep.points), dtype=np.bool_), ""
+    shown = np.ones(len(sweep.points), dtype=np.bool_)
     if sample:
-        return View(sweep=sweep, column=fields[name], paths=paths, shown=shown, note=note)
+        return View(sweep=sweep, column=fields[name], paths=paths, shown=shown, held="")
     row = sweep.best_or_nearest or 0
     others = [axis for axis in sweep.plan.axes if axis not in most and len(axis.grid()) > 1]
     for axis in others:
         values = [sweep.points[row].get(path) for path in axis.paths]
         shown &= [[point.get(path) for path in axis.paths] == values for point in sweep.points]
-    held = ", ".join(sweep.axis_text(axis, row) for axis in others)
-    if others:
-        note = f"{held if len(held) <= _MAX_NOTE_CHARACTERS else 'other keys'} as in row {row}"
-    return View(sweep=sweep, column=fields[name], paths=paths, shown=shown, note=note)
+    held = ", ".join(_held_text(sweep, axis, row) for axis in others)
+    return View(sweep=sweep, column=fields[name], paths=paths, shown=shown, held=held)
+
+
+def _held_text(sweep: Sweep, axis: SweepAxis, row: int) -> str:
+    """Value of an axis in a row, under the name that a figure's axis has."""
+    point = sweep.points[row]
+    if axis.names:
+        return f"{axis.head.partition('.')[0]}: {axis.name_of(point)}"
+    return ", ".join(f"{axis_name(path)} = {setting_text(path, point.get(path))}" for path in axis.paths)
 
 
 def axis_name(path: str) -> str:
@@ -234,9 +240,9 @@ def _drawing(view: View, width: float | None) -> Drawing:
     unmet = "not met or undecided" if sweep.runs else "no flow"
 
     def paint(panel: Axes) -> None:
-        if view.note:
-            note = view.note if page else fill(view.note, _MAX_COLUMN_NOTE_CHARACTERS)
-            panel.plot([], [], linestyle="", label=note)
+        if view.held:
+            note = view.held if len(view.held) <= _MAX_NOTE_CHARACTERS else "other keys held"
+            panel.plot([], [], linestyle="", label=note if page else fill(note, _MAX_COLUMN_NOTE_CHARACTERS))
         if len(keys) == 1:
             order = np.argsort(over[0], kind="stable")
             panel.plot(over[0][order], over[1][order], color=MUTED, linewidth=1)

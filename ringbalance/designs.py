@@ -43,8 +43,9 @@ def sweep(
     """Answer every point of a grid, or of a sample, of changed scenes.
 
     Args: `vary`: by path such as "tube.bore", an array in SI, a list of values as a scene file has them, or
-        a text such as "0.5mm:2mm:30"; by a tuple of paths that move together, one of these for each; by the
-        name of a table, a list of mappings from its keys, or a CSV file. `sample`: "sobol:1024" or
+        a text such as "0.5mm:2mm:30"; by a tuple of k paths that move together, one of these for each, or
+        an array of shape (points, k), a row for each point, as packages for the design of experiments have
+        it; by the name of a table, a list of mappings from its keys, or a CSV file. `sample`: "sobol:1024" or
         "latin:1024" instead of every combination; ranges are "0.5mm:2mm" then. `runs`: largest number
         of drawn devices of each point, fewer where they decide. `intervals`: True to propagate uncertain
         inputs, which takes most of the time of static answers. `check`: number of
@@ -60,23 +61,30 @@ def sweep(
         >>> table = rb.sweep(scene, {"tube.bore": [1e-3, 1.5e-3], "gas.pressure": "0.6MPa:0.8MPa:3"})
         >>> len(table.points)
         6
+        >>> points = np.array([[1e-3, 0.6e6], [1.2e-3, 0.7e6], [1.5e-3, 0.65e6]])
+        >>> table = rb.sweep(scene, {("tube.bore", "gas.pressure"): points})
+        >>> table.points[1]
+        {'tube.bore': 0.0012, 'gas.pressure': 700000.0}
     """
     if not isinstance(vary, Mapping):
         raise TypeError(f'`vary` maps keys to values, such as {{"tube.bore": [1e-3, 2e-3]}}: {vary!r}')
     if executor is not None and not hasattr(executor, "submit"):
         raise TypeError(f"`executor` is none of concurrent.futures: {executor!r}")
     check_counts("sweep", runs=runs, check=check, workers=workers)
-    return run_sweep(
-        scene,
-        plan_of(scene, vary, sample=sample),
-        runs=runs,
-        intervals=intervals,
-        check=check,
-        store=None if store is None else Path(store),
-        executor=executor,
-        workers=workers,
-        progress=progress,
-    )
+    try:
+        return run_sweep(
+            scene,
+            plan_of(scene, vary, sample=sample),
+            runs=runs,
+            intervals=intervals,
+            check=check,
+            store=None if store is None else Path(store),
+            executor=executor,
+            workers=workers,
+            progress=progress,
+        )
+    except SceneError as error:
+        raise error.as_keys_of("rb.sweep") from None
 
 
 @checked

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import product
 from pathlib import Path
@@ -23,7 +23,7 @@ from ringbalance.design.choices import NAME, as_toml, read_choices
 from ringbalance.results.numbers import format_given, plain
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import quantiles
-from ringbalance.scene.faults import COMMAND_LINE, Fault, SceneError, did_you_mean
+from ringbalance.scene.faults import Fault, SceneError, did_you_mean
 from ringbalance.scene.keys.fields import ValueReader
 from ringbalance.scene.keys.schema import ORIGIN, Schema
 from ringbalance.scene.kinds import scene_kind
@@ -182,8 +182,8 @@ def plan_of(scene: SceneFile, vary: Mapping[Any, Any], *, sample: str = "") -> P
     """Plan from values in Python.
 
     Args: `vary`: by path, an array, SI, a list of values as in a scene file, or the VALUES of an axis as
-        text; by a tuple of paths, one such list for each path; by the name of a table, a list of mappings
-        from its keys, or a CSV file.
+        text; by a tuple of k paths, one such list for each path, or an array of shape (points, k); by the
+        name of a table, a list of mappings from its keys, or a CSV file.
     Raises: SceneError: all errors of the axes together.
     """
     return _plan([partial(_axis_of, scene, name, values) for name, values in vary.items()], sample)
@@ -244,12 +244,7 @@ def plan_of_file(scene: SceneFile, file: Path) -> Plan:
         if sample:
             _sample_size(sample)
     except SceneError as error:
-        raise SceneError(
-            replace(each, file=str(file), key=each.key.removeprefix("--"))
-            if each.file == COMMAND_LINE
-            else each
-            for each in error.faults
-        ) from error
+        raise error.as_keys_of(str(file)) from error
     return plan
 
 
@@ -271,8 +266,15 @@ def _axis_of_text(scene: SceneFile, text: str, *, folder: Path) -> SweepAxis:
 
 def _axis_of(scene: SceneFile, name: Any, values: Any) -> SweepAxis:
     if isinstance(name, tuple):
+        keys, shape = ", ".join(map(str, name)), tuple(getattr(values, "shape", ()))
+        if shape == (len(name), len(name)) and len(name) > 1:
+            problem = "in a square array the rows may be points or keys"
+            raise _fault(keys, problem, "a list with an array for each key, such as list(points.T)")
+        if len(shape) == 2 and shape[1] == len(name):
+            values = np.asarray(values).T
         if len(name) != len(values):
-            raise _fault(", ".join(map(str, name)), f"{len(values)} lists of values", "one for each key")
+            what = f"an array of shape {shape}" if shape else f"{len(values)} lists of values"
+            raise _fault(keys, what, "one for each key, or an array with a row for each point")
         return _linked([_values(scene, path, each) for path, each in zip(name, values, strict=True)], name[0])
     if name in scene_kind(scene.balancer).schema.tables:
         if isinstance(values, str | Path):

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import REQUIRED_FRACTION, Demand
+from ringbalance.controller.balancer import REQUIRED_FRACTION, Demand, balancer_of
 from ringbalance.controller.judging.judge import Judgement, plain_settings
 from ringbalance.controller.judging.ranking import Ranking
 from ringbalance.controller.judging.tuning import (
@@ -24,7 +24,7 @@ from ringbalance.design.axes import Point
 from ringbalance.design.designing import Design
 from ringbalance.design.races import PRESSURE
 from ringbalance.design.space import VALVE
-from ringbalance.results.numbers import MISSING, format_given, percent
+from ringbalance.results.numbers import MISSING, format_given, percent, with_unit
 from ringbalance.results.requirements import AT_LEAST, MET, MISSED, OPEN
 from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
@@ -120,6 +120,10 @@ def _quantities(design: Design) -> Iterator[Quantity]:
         yield from reported_quantities(judgement)
         yield Quantity(key="size", name="cylinder around the chambers", value=design.size, unit="m^3")
         yield Quantity(key="reach", name="cancels in any direction", value=design.reach, unit="kg m")
+        rotor = balancer_of(design.given).rotor()
+        if rotor.runout is None:
+            least = max(design.needed - rotor.limit / abs(rotor.influence), 0.0)
+            yield Quantity(key="least_reach", name="needed to come to the limit", value=least, unit="kg m")
     yield Quantity(key="needed_unbalance", name="initial unbalance", value=design.needed, unit="kg m")
 
 
@@ -146,6 +150,8 @@ def _findings(design: Design) -> Iterator[Finding]:
     yield from reported_findings(judgement)
     if design.endurance is not None:
         yield design.endurance.finding
+    if design.holding is not None and design.holding.finding is not None:
+        yield design.holding.finding
     yield Finding(code="design_looked", values=counted)
     yield from _refusals(static.refusals, static.points)
     if design.succeeded:
@@ -281,23 +287,31 @@ def _unchanged_table(design: Design) -> Iterator[Table]:
 
 def _effects_table(design: Design) -> Table:
     rows = []
+    compared, devices = [(e.met, e.compared) for e in design.effects if e.met and e.compared], "devices"
+    for met, pairs in compared[:1]:
+        devices = f"{met.of} devices"
+        rows.append(("unchanged", "", _per_cent(met.value - pairs.difference[0]), ""))
     for each in design.effects:
         instead = (
             design.space.names({**design.point, **each.changes})[each.path]
             if each.path in design.space.parts
             else setting_text(each.path, each.changes[each.path])
         )
-        met = "no such design" if each.met is None else percent(each.met.value, digits=3)
+        text = "no such design" if each.met is None else _per_cent(each.met.value)
         change = ""
         if each.compared is not None:
             mean, half = each.compared.difference
-            low, high = 100 * (mean - half), 100 * (mean + half)
-            change = f"{percent(mean, signed=True)} ({low:+.1f} to {high:+.1f})"
-        rows.append((each.path, instead, met, change))
-    heads = ("key", "instead", "devices that meet all", "change, 95 %")
-    return Table(
-        caption="One key changed, the settings as they are, on the same devices", heads=heads, rows=rows
-    )
+            points = (100 * mean, 100 * (mean - half), 100 * (mean + half))
+            change = "{:+z.1f} ({:+z.1f} to {:+z.1f})".format(*points)
+        rows.append((each.path, instead, text, change))
+    heads = ("key", "instead", "devices that meet all", "change in percentage points, 95 %")
+    caption = f"One key changed, the settings as they are, on the same {devices}"
+    return Table(caption=caption, heads=heads, rows=rows)
+
+
+def _per_cent(fraction: float) -> str:
+    """A fraction to a tenth of a percentage point, as the changes beside it."""
+    return with_unit(f"{100 * fraction:.1f}", "%")
 
 
 def _front_table(design: Design) -> Table:

@@ -28,6 +28,7 @@ from ringbalance.design.races import RacedDesign, Races, deal
 from ringbalance.design.racing import DEVICES, devices_row, judged_design
 from ringbalance.design.space import OF_SCENE, VALVE, Space
 from ringbalance.design.static import row_reach, static_rows
+from ringbalance.reduced_model.residual_liquid import Holding
 from ringbalance.results.requirements import MET, Paired, Proportion
 from ringbalance.results.result import Presentation, PresentedResult
 from ringbalance.scene.faults import SceneError
@@ -98,6 +99,9 @@ class Design(PresentedResult):
     unchanged: tuple[Judgement, float | None] | None = None
     """Judgement of the scene's own disc and settings, and the unbalance that it cancels, kg m; None: the size
     varies."""
+    holding: Holding | None
+    """Stability of the fullest chamber's liquid with the gas off, as of a calibration of the design; None:
+    no design can work."""
     endurance: Endurance | None
     """Devices over the hours of holding; None: the loss of liquid is not known, or not required."""
 
@@ -207,15 +211,19 @@ def run_design(
                 queue.insert(0, larger)
         if best is not None and space.sized:
             doubt = _size_half_width(best.race.judgement.fraction, growth(races, best))
-    reach, smaller, ranking, held = None, None, Ranking(), None
+    reach, smaller, ranking, held, holding = None, None, Ranking(), None, None
     if best is not None:
-        reach = row_reach(static_rows(space.scene, [best.point], intervals=False)[0])
+        row = static_rows(space.scene, [best.point], intervals=False)[0]
+        reach = row_reach(row)
+        lowest = max(row["values"][name][0] or 0.0 for name in ("residual_fill_ratio", "stalled_fill_ratio"))
+        designed_scene = liquid_ring_scene(scene.with_values(best.point))
+        holding = Holding.of(designed_scene, fill_ratio=2 * designed_scene.disc.initial_fill - lowest)
         below = [each for each in judged if each.size < best.size]
         if space.sized and below:
             next_smaller = max(below, key=lambda each: each.size)
             smaller = next_smaller.size, next_smaller.race.judgement.fraction
         if judgement is not None:
-            designed = balancer_of(scene.with_values(best.point))
+            designed = balancer_of(designed_scene)
             ranking, held = ranked(designed, judgement), endurance(designed, judgement, report_progress)
     return Design(
         presentation=presentation,
@@ -239,6 +247,7 @@ def run_design(
         front=() if best is None else _front(races, required_fraction, best),
         effects=effects,
         ranking=ranking,
+        holding=holding,
         endurance=held,
     )
 

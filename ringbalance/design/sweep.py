@@ -25,9 +25,9 @@ from ringbalance.results.requirements import MET, Proportion
 from ringbalance.results.result import Result, Rows, Table, csv_text, extra
 from ringbalance.results.rows import Finding, Quantity, Value, around, series
 from ringbalance.scene.describe import setting_text
-from ringbalance.scene.faults import SceneError
+from ringbalance.scene.faults import COMMAND_LINE, Fault, SceneError
 from ringbalance.scene.kinds import scene_kind
-from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.origins import SceneFile, summary_text
 from ringbalance.scene.platform.display import LOG
 from ringbalance.scene.registry import registered
 
@@ -115,6 +115,11 @@ class Sweep(Result):
     resumed: Mapping[str, int]
     """Number of points with results stored by an earlier run, for "static" and "runs"."""
 
+    def __repr__(self) -> str:
+        """Title and all findings, as the command prints them."""
+        rows = self.rows()
+        return summary_text([rows.title, *(each.text for each in rows.findings)])
+
     @cached_property
     def verdicts(self) -> tuple[str, ...]:
         """Verdict on each point by its runs, else the status of its static row."""
@@ -156,7 +161,7 @@ class Sweep(Result):
 
     def point_scene(self, row: int) -> SceneFile:
         """Scene of a row. Raises: SceneError: a refused row, or no such row."""
-        check_rows([row], len(self.points))
+        check_rows([row], len(self.points), file="point_scene", key="row")
         return self.scene.with_values(self.points[row])
 
     def columns(self) -> dict[str, list[Any]]:
@@ -240,11 +245,12 @@ class Sweep(Result):
     def sensitivity(self, *, total: bool = False) -> Shares:
         """Share of the variance of each result that each axis explains, and its half-width (95 %).
 
-        For samples, see `first_order`; empty for a grid, and for results with too few points, one
-        value, or a variance that a few points carry.
+        First-order Sobol indices by a cosine series, see `first_order`. For samples; empty for a grid, and
+        for results with too few points, one value, or a variance that a few points carry.
         Shares below zero, or with a sum above 1, are noise of the sample: an interval that contains zero
         shows no influence; more points narrow it.
-        Args: `total`: True includes interactions of an axis with others, see `total_order`.
+        Args: `total`: True for total Sobol indices, by a polynomial, in place of these: they include the
+            interactions of an axis with others, see `total_order`.
         """
         changed = {*self.plan.paths, *(axis.head for axis in self.plan.axes)}
         names = [column.name for column in self.fields() if column.name not in changed]
@@ -448,12 +454,13 @@ class Sweep(Result):
             yield Table(caption="Beside a calibration of some rows", heads=heads, rows=rows)
 
 
-def check_rows(rows: Sequence[int], count: int) -> None:
+def check_rows(rows: Sequence[int], count: int, *, file: str = COMMAND_LINE, key: str = "--write") -> None:
     """Check row numbers against the length of a table. Raises: SceneError: no such row."""
     for row in rows:
         if not 0 <= row < count:
             allowed = f"0 to {count - 1}"
-            raise SceneError.of_option(option="--write", value=row, problem="no such row", allowed=allowed)
+            fault = Fault(file=file, key=key, value=str(row), problem="no such row", allowed=allowed)
+            raise SceneError([fault])
 
 
 def _cell(value: Any) -> Any:

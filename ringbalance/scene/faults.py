@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ringbalance.scene.toml import toml_text
 
@@ -81,6 +81,13 @@ class SceneError(Exception):
         """The error of a command-line option that cannot be used."""
         value = toml_text(value)
         return cls([Fault(file=COMMAND_LINE, key=option, value=value, problem=problem, allowed=allowed)])
+
+    def as_keys_of(self, file: str) -> SceneError:
+        """The errors, those of options as of keys of a file or arguments of a function of the same names."""
+        return SceneError(
+            replace(each, file=file, key=each.key.removeprefix("--")) if each.file == COMMAND_LINE else each
+            for each in self.faults
+        )
 
 
 def closest(word: str, words: Iterable[str]) -> str:

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from design_answers import PROBLEMS, compared
 from design_spread import answer
+from matplotlib.axes import Axes
 from scipy.special import expit, logit
 
 import ringbalance as rb
@@ -125,6 +126,63 @@ def test_the_judged_designs_are_drawn_with_the_chosen_one_and_what_is_required(
     words = ("chosen", "required", "met", "not met", "devices that meet all, in %", "in ml", "in MPa")
     assert [word for word in words if word not in text] == []
     assert design.point in [each.point for each in design.tried]
+
+
+def test_the_chosen_design_is_drawn_where_its_verdict_is_printed(
+    design: rb.Design, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The search's own count of the chosen design is another one, of other devices."""
+    rings: list[float] = []
+    plot = Axes.plot
+
+    def plotted(axes: Axes, x: Any, y: Any, **look: Any) -> Any:
+        rings.extend(y if look.get("label") == "chosen" else ())
+        return plot(axes, x, y, **look)
+
+    monkeypatch.setattr(Axes, "plot", plotted)
+    assert design.judgement is not None
+    names = ("meets", "verdict", "required_fraction")
+    kept = {name: getattr(design.judgement, name) for name in names}
+    printed: Any = SimpleNamespace(fraction=Proportion(count=1, of=2), **kept)
+    replace(design, judgement=printed).plot()
+    assert rings[0] == 50.0
+
+
+def test_a_design_says_what_unbalance_it_needs_to_cancel(design: rb.Design) -> None:
+    """The initial unbalance less that of the vibration that is permitted."""
+    values = {each.key: each.value for each in design.rows().quantities}
+    rotor = balancer_of(design.given).rotor()
+    assert values["needed_unbalance"] == pytest.approx(abs(rotor.unbalance))
+    least = values["least_reach"]
+    assert least is not None
+    assert (abs(rotor.unbalance) - least) * abs(rotor.influence) == pytest.approx(rotor.limit)
+
+
+def test_a_design_whose_crest_may_not_hold_says_so_as_its_calibration(design: rb.Design) -> None:
+    """Here its own crest; and a finding of the same kind wherever liquid may run back, none elsewhere."""
+    calibrated = rb.calibrate(design.recommended_scene)
+    assert design.holding is not None
+    assert design.holding.finding is not None
+    assert design.holding.largest_hump_radius == pytest.approx(
+        calibrated.holding.largest_hump_radius, rel=1e-6
+    )
+    assert design.holding.finding in design.rows().findings
+    assert design.holding.finding.code in [each.code for each in calibrated.rows().findings]
+    sure = replace(design, holding=replace(design.holding, sure_speed=1.0))
+    assert [each for each in design.rows().findings if each not in sure.rows().findings] == [
+        design.holding.finding
+    ]
+
+
+def test_changes_of_one_key_are_percentage_points_of_the_unchanged_design(design: rb.Design) -> None:
+    table = next(each for each in design.rows().tables if each.caption.startswith("One key changed"))
+    (name, _, base, _), *rows = table.rows
+    assert (name, table.heads[-1]) == ("unchanged", "change in percentage points, 95 %")
+    for _, _, met, change in rows:
+        assert re.fullmatch(r"[+-]\d+\.\d \([+-]\d+\.\d to [+-]\d+\.\d\)", change)
+        difference = float(met.split("\u202f")[0]) - float(base.split("\u202f")[0])
+        assert float(change.split()[0]) == pytest.approx(difference, abs=0.11)
+        assert "-0.0" not in change
 
 
 def test_threads_make_no_difference(design: rb.Design) -> None:

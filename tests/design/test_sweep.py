@@ -244,6 +244,13 @@ def test_intervals_of_a_sweep_say_that_they_are_of_inputs_alone(paper_scene: Sce
     assert "sweep_intervals" not in {each.code for each in bare.rows().findings}
 
 
+def test_a_printed_sweep_has_all_findings(paper_scene: Scene) -> None:
+    sweep = rb.sweep(paper_scene, {"tube.bore": ["1.2 mm", "1.4 mm"]}, check=1)
+    findings = sweep.to_dict()["findings"]
+    assert {"sweep_best", "sweep_left_out", "sweep_intervals"} <= {each["code"] for each in findings}
+    assert [line.strip() for line in repr(sweep).splitlines()[1:]] == [each["text"] for each in findings]
+
+
 def test_too_few_devices_to_meet_a_fraction_are_named_before_they_run(
     paper_scene: Scene, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

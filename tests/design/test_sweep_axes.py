@@ -165,6 +165,30 @@ def test_arguments_that_make_no_sense_are_named(paper_scene: Scene) -> None:
             rb.sweep(paper_scene, vary)
 
 
+def test_an_array_of_points_is_an_axis_with_a_row_for_each(paper_scene: Scene) -> None:
+    points = np.array([[1e-3, 60e-3], [1.2e-3, 70e-3], [1.5e-3, 80e-3]])
+    paths = ("tube.bore", "disc.axial_width")
+    table = rb.sweep(paper_scene, {paths: points}, intervals=False)
+    assert [tuple(point.values()) for point in table.points] == [*map(tuple, points.tolist())]
+    assert table.points == rb.sweep(paper_scene, {paths: points.T}, intervals=False).points
+    for shape, problem in (((2, 2), "square array"), ((5, 3), r"shape \(5, 3\)")):
+        with pytest.raises(rb.SceneError, match=problem):
+            rb.sweep(paper_scene, {paths: np.ones(shape)})
+
+
+def test_errors_from_python_name_the_function_and_its_argument(paper_scene: Scene) -> None:
+    table = rb.sweep(paper_scene, {"tube.bore": [1e-3]}, intervals=False)
+    for call, start in (
+        (lambda: rb.sweep(paper_scene, {"tube.bor": [1e-3]}), 'rb.sweep: vary = "tube.bor": '),
+        (lambda: rb.sweep(paper_scene, {}), 'rb.sweep: vary = "": nothing varies'),
+        (lambda: rb.sweep(paper_scene, {"tube.bore": "1mm:2mm"}, sample="none"), 'rb.sweep: sample = "none"'),
+        (lambda: table.point_scene(3), "point_scene: row = 3: no such row; allowed: 0 to 0"),
+    ):
+        with pytest.raises(rb.SceneError) as caught:
+            call()
+        assert str(caught.value).startswith(start)
+
+
 def test_a_single_value_and_a_single_row_are_lists_of_one(paper_scene: Scene) -> None:
     valve = {"conductance": "1 l/(s*bar)", "critical_ratio": 0.3, "valve_lag": "2 ms"}
     sweep = rb.sweep(paper_scene, {"tube.bore": 1e-3, "gas": valve}, intervals=False)

@@ -136,11 +136,24 @@ def test_a_map_of_more_axes_shows_those_with_most_values(
     """The others are held as in the best row; colours and lines are those of a two-axis sweep."""
     vary = {"gas": valves, "tube.bore": "1mm:2mm:3", "gas.pressure": "0.2MPa:0.8MPa:4"}
     sweep = rb.sweep(paper_scene, vary, intervals=False)
-    reach = sweep.plot(tmp_path)[0].read_text()
-    assert any(text.startswith("gas.name = slow as in row") for text in texts(reach))
+    files = sweep.plot(tmp_path)
+    reach = files[0].read_text()
+    assert "gas: slow" in texts(reach)
+    assert f"Gas: slow, as in row {sweep.best}." in files[-1].read_text()
     alone = rb.sweep(paper_scene, dict(list(vary.items())[1:]), intervals=False)
     (alone_map, _), (full_map, _) = embedded(sweep_drawings(alone)[0].standalone()), embedded(reach)
     assert alone_map.tobytes() == full_map.tobytes()
+
+
+def test_a_key_that_a_map_holds_has_the_name_of_an_axis(paper_scene: Scene, tmp_path: Path) -> None:
+    """For a paper's figure without the number of a row, which the page has."""
+    vary = {"tube.bore": "1mm:2mm:3", "disc.axial_width": "60mm,80mm", "gas.pressure": "0.6MPa:0.8MPa:3"}
+    sweep = rb.sweep(paper_scene, vary, intervals=False)
+    *figures, page = sweep.plot(tmp_path)
+    for figure in figures:
+        assert "axial width B = 80 mm" in " ".join(texts(figure.read_text()))
+        assert "row" not in figure.read_text().split()
+    assert f"Axial width B = 80 mm, as in row {sweep.best}." in page.read_text().replace("\u202f", " ")
 
 
 @pytest.mark.parametrize(("count", "sample"), [("", "sobol:64"), (":4", "")])

@@ -61,6 +61,7 @@ def sweep(
         >>> table = rb.sweep(scene, {"tube.bore": [1e-3, 1.5e-3], "gas.pressure": "0.6MPa:0.8MPa:3"})
         >>> len(table.points)
         6
+        >>> import numpy as np
         >>> points = np.array([[1e-3, 0.6e6], [1.2e-3, 0.7e6], [1.5e-3, 0.65e6]])
         >>> table = rb.sweep(scene, {("tube.bore", "gas.pressure"): points})
         >>> table.points[1]

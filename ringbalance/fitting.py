@@ -18,7 +18,7 @@ from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.reading import preview, read_observations
 from ringbalance.identification.reading import template as template_of
-from ringbalance.identification.saving import save_result
+from ringbalance.identification.saving import kept_start, save_result
 from ringbalance.interface import checked, print_result
 from ringbalance.scene import AnyScene, SceneError, load_scene
 from ringbalance.scene.faults import did_you_mean
@@ -126,6 +126,8 @@ def fit_files(options: SimpleNamespace) -> int:
         text = result.review.text
         save_result(options.save, scene=scene, result=result.result, data=result.data, said=text)
         print_message(f"fitted scene written to {options.save}")
+        for sentence in kept_start(scene, result.data):
+            print_message(sentence)
     if options.plot is not None:
         result.plot(options.plot)
     return 0 if result.succeeded else 1

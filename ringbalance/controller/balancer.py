@@ -382,7 +382,7 @@ class Balancer(ABC):
     @abstractmethod
     def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> Self:
         """This balancer on a rotor at constant speed in steady vibration, with one requirement: to come below
-        that rotor's limit.
+        that rotor's limit, in the time that it leaves.
 
         Args: `rotors`: of the drawn devices; default the balancer's own. Raises: SceneError: the balancer
             cannot work on the rotor.

@@ -9,6 +9,7 @@ fraction that of the scene that requires more, so that nothing depends on the or
 from __future__ import annotations
 
 import cmath
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
@@ -35,6 +36,7 @@ from ringbalance.controller.rotor import (
     vibrating,
 )
 from ringbalance.reduced_model.terms import ModelUsed
+from ringbalance.results.numbers import format_given
 from ringbalance.results.requirements import MET, Paired, Proportion
 from ringbalance.results.result import Cells, Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value, text_of
@@ -81,14 +83,16 @@ class Side:
     """Time from one vibration sample to the next, s; None: it takes no samples."""
     models_used: tuple[ModelUsed, ...] = ()
     """Physical terms with model and estimated contribution, for a liquid ring."""
+    time: float = math.inf
+    """Required settling time of the rotor, s; infinite: none."""
     within: Demand | None = None
     """Demand on the rotor itself, of which the reading differs; None: the sensor has no runout."""
 
     @property
     def served(self) -> BoolArray:
-        """True for each device that settles within the span, by its reading, and whose rotor is within the
-        limit where the scene requires that."""
-        return served(self.outcomes, self.within)
+        """True for each device that settles within the required time, by its reading, and whose rotor is
+        within the limit where the scene requires that."""
+        return served(self.outcomes, self.within, self.time)
 
     @property
     def fraction(self) -> Proportion:
@@ -116,6 +120,9 @@ class Side:
         name = "devices that settle"
         settled = Proportion.where(self.outcomes.settled)
         yield Quantity.of_fraction(settled, key=f"{prefix}fraction_settled", name=name)
+        if math.isfinite(self.time):
+            name, settled = "the same, in time", Proportion.where(self.outcomes.settling_time <= self.time)
+            yield Quantity.of_fraction(settled, key=f"{prefix}fraction_in_time", name=name)
         if self.within is not None:
             rotors, name = (
                 Proportion.where(self.within.met(self.outcomes)),
@@ -224,6 +231,7 @@ class Comparison(Result):
                 "initial_amplitude_m": rotor.amplitude,
                 "noise_m": rotor.noise,
                 "limit_m": rotor.limit,
+                "settling_time_s": rotor.settling_time,
             },
             **self.rows().document(),
         }
@@ -243,6 +251,10 @@ class Comparison(Result):
                 ("span", "time of each run, at most", "s", self.span),
             )
         ]
+        in_time = ""
+        if (time := rotor.settling_time) is not None:
+            in_time, name = f" within {format_given(time, 's', digits=4)}", "settling time required"
+            of_rotor.append(Quantity(key="required_time", name=name, unit="s", value=time, origin="given"))
         if rotor.runout is not None:
             size = rotor.runout.amplitude
             of_rotor.append(Quantity(key="runout", name="runout", unit="m", value=size, origin="given"))
@@ -251,6 +263,7 @@ class Comparison(Result):
         # The verdict on both, then settling and kind of energy of each.
         fewer, more = sorted((self.paired.first_alone, self.paired.second_alone))
         values: dict[str, Value] = {"of": sides[0].fraction.of, "fewer": fewer, "more": more}
+        values["in_time"] = in_time
         code = "compared_alike"
         if self.better is not None:
             code, values["source"] = "compared_better", sides[self.better].scene.source
@@ -263,7 +276,7 @@ class Comparison(Result):
             findings.append(Finding(code="compared_runout", values=values))
         for side in sides:
             share = side.fraction
-            values = {"source": side.scene.source, "text": side.status}
+            values = {"source": side.scene.source, "text": side.status, "in_time": in_time}
             values |= {"share": share.value, "low": share.low, "high": share.high, "of": share.of}
             code = "side_settled" if share.count == share.of else "side_not_settled"
             findings.append(Finding(code=code, values=values))
@@ -280,9 +293,9 @@ class Comparison(Result):
         cells: list[Cells] = [
             ("balancer", *(side.scene.balancer.replace("_", " ") for side in sides)),
             ("settings", *(text or "the scene's" for text in changed)),
-            *((left.name, left.text, right.text) for left, right in zip(*of_sides, strict=True)),
+            *((left.name, _cell(left), _cell(right)) for left, right in zip(*of_sides, strict=True)),
         ]
-        note = "medians of the devices that settle; -/+: to the smallest and the largest"
+        note = "medians of the devices that settle, with the smallest and the largest"
         return Rows(
             title=f"Two balancers on the rotor of {rotor.source}",
             quantities=(*of_rotor, *of_sides[0], *of_sides[1]),
@@ -330,14 +343,15 @@ def compare(
             next((d for d in (*each.demands(), *each.reported()) if d.code == ROTOR_AMPLITUDE), None)
             for each in balancers
         ]
-        outcomes = _run_both(balancers, settings, within, most=most, progress=report)
+        time = math.inf if common.settling_time is None else common.settling_time
+        outcomes = _run_both(balancers, settings, within, time, most=most, progress=report)
         sides = []
         for balancer, chosen, ended, demand in zip(balancers, settings, outcomes, within, strict=True):
             numbers = range(FIRST_VERDICT_DEVICE, FIRST_VERDICT_DEVICE + ended.settled.size)
             before = np.array([rotors(number).amplitude for number in numbers])
             draws = Draws.block(FIRST_VERDICT_DEVICE, _TRACED_DEVICES)
             traced = balancer.run(chosen, draws, trace=True).traced
-            shown = next((run for run in traced if not run.settled), traced[0])
+            shown = next((run for run in traced if not run.settled or run.settling_time > time), traced[0])
             tuned = balancer.on_scene(with_values_at(balancer.scene, chosen))
             sides.append(
                 Side(
@@ -350,6 +364,7 @@ def compare(
                     energy_kind=balancer.energy_kind,
                     sampling_time=balancer.sampling_time() or None,
                     models_used=tuned.models_used,
+                    time=time,
                     within=demand,
                 )
             )
@@ -363,17 +378,27 @@ def compare(
     return Comparison(rotor=common, span=span, asked=required, sides=(sides[0], sides[1]))
 
 
-def served(outcomes: Outcomes, within: Demand | None) -> BoolArray:
+def served(outcomes: Outcomes, within: Demand | None, time: float) -> BoolArray:
     """True for each device of `Side.served`."""
-    if within is None or not within.stated:
-        return outcomes.settled
-    return outcomes.settled & within.met(outcomes)
+    in_time = outcomes.settled & (outcomes.settling_time <= time)
+    return in_time if within is None or not within.stated else in_time & within.met(outcomes)
+
+
+def _cell(quantity: Quantity) -> str:
+    """Text of a quantity of one side; a median with the smallest and the largest, three digits each."""
+    name = quantity.key.partition(".")[2]
+    if quantity.lower is None or name not in {key for _, _, key, *_ in _DEVICE_NUMBERS}:
+        return quantity.text
+    numbers = (quantity.value, quantity.lower, quantity.upper)
+    value, low, high = (format_given(each, quantity.unit, digits=3) for each in numbers)
+    return f"{value} ({low} to {high})"
 
 
 def _run_both(
     balancers: Sequence[Balancer],
     settings: Sequence[Settings],
     within: Sequence[Demand | None],
+    time: float,
     *,
     most: int,
     progress: Callable[[str], None],
@@ -389,6 +414,6 @@ def _run_both(
         ]
         outcomes = [a.joined(b) for a, b in zip(outcomes, new, strict=True)] if outcomes else new
         count += block
-        difference = Paired.of(*map(served, outcomes, within)).better(_DIFFERENCE_LEVEL)
+        difference = Paired.of(*map(served, outcomes, within, (time, time))).better(_DIFFERENCE_LEVEL)
         block = 0 if difference is not None else min(count, most - count)
     return outcomes

@@ -102,7 +102,7 @@ class CommonRotor:
 
     For a balancer, vibration before balancing and vibration per unbalance describe a rotor at constant speed,
     V = alpha (U_0 + U_balancer).  One rotor therefore means: the same speed, the same complex alpha, the same
-    U_0, the same sensor and the same amplitude to come below.
+    U_0, the same sensor and the same amplitude to come below, within the same time.
     """
 
     source: str
@@ -119,6 +119,8 @@ class CommonRotor:
     """Standard deviation of the measured vibration, m."""
     limit: float
     """Amplitude to come below, m."""
+    settling_time: float | None = None
+    """Time within which to come below it, s; None: that of the run."""
     runout: Runout | None = None
     """Vector that the sensor adds to every vibration; None: nothing."""
     limits_rotor: bool = False
@@ -153,16 +155,19 @@ def rotor_difference(rotor: CommonRotor, other: CommonRotor) -> str | None:
 
 
 def joined_rotor(rotor: CommonRotor, other: CommonRotor) -> CommonRotor:
-    """Join two descriptions of one rotor: the more vibration, the worse sensor and the narrower limit.
+    """Join two descriptions of one rotor: the more vibration, the worse sensor, the narrower limit and
+    the shorter time to come below it.
 
     Symmetric in both: no verdict under it depends on which is named first.
     """
     rougher = max(rotor, other, key=lambda each: (each.amplitude, each.mass or 0.0))
+    times = [each.settling_time for each in (rotor, other) if each.settling_time is not None]
     runouts = [each.runout for each in (rotor, other) if each.runout is not None]
     return replace(
         rougher,
         noise=max(rotor.noise, other.noise),
         limit=min(rotor.limit, other.limit),
+        settling_time=min(times, default=None),
         # Of equal runouts that whose phase is not known.
         runout=max(runouts, key=lambda each: (each.amplitude, each.phase is None, each.phase), default=None),
         limits_rotor=rotor.limits_rotor or other.limits_rotor,

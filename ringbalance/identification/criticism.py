@@ -266,9 +266,11 @@ class Review:
         """Test the residuals of a fit and compare alternative readings of its data."""
         best = result.optimum
         ranges = tuple(compared_columns(best.residuals.problem))
+        explained = tuple(_shares_explained(best))
+        unexplained = [each.file for each in explained if each.fails]
         return cls(
             criticism=_Criticism.of(_LinearFit.of(best)),
-            explained=tuple(_shares_explained(best)),
-            readings=other_readings(best, ranges, stated=result.stated),
+            explained=explained,
+            readings=other_readings(best, ranges, stated=result.stated, unexplained=unexplained),
             ranges=ranges,
         )

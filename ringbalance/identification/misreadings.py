@@ -56,8 +56,12 @@ def _exchanged(observations: Observations, _: Any) -> Observations | None:
 
 
 def _turned(name: str, observations: Observations, _: Any) -> Observations | None:
-    """Reverse the sign of the angles whose names begin with `name`."""
-    chosen = {n: -v for n, v in observations.columns.items() if n.startswith(name)}
+    """Reverse the sign of the angles whose names begin with `name`, as they stand in the file.
+
+    There a phase p of displacement stands as p + lead; reversed, it is -(p + lead) - lead.
+    """
+    leads = observations.leads
+    chosen = {n: -v - 2 * leads.get(n, 0.0) for n, v in observations.columns.items() if n.startswith(name)}
     vibration = any(n.startswith("phase") for n in observations.columns)
     return observations.with_columns(**chosen) if chosen and vibration else None
 

@@ -111,8 +111,9 @@ def observations_of(
     if speed_faults:
         return None, (*wrong, *speed_faults)
     columns, cell_faults = _columns(table, kind, speed)
+    leads: dict[str, float] = {}
     for head in table.heads:
-        remarks += _turned(head, kind, columns, speed)
+        remarks += _turned(head, kind, columns, speed, leads)
     uncertainty, stated_faults = _stated_uncertainty(table, kind, columns, speed)
     # A cell with an error has no value that a relative uncertainty could be of.
     bad = {fault.key.split(",")[0] for fault in cell_faults}
@@ -137,6 +138,7 @@ def observations_of(
         chamber=np.array(letters, dtype=np.str_),
         columns=_zero_to_peak(used, kind, factor),
         remarks=remarks,
+        leads=leads,
         uncertainty=_zero_to_peak(uncertainty, kind, factor),
     ), ()
 
@@ -244,7 +246,9 @@ def _speed(table: CsvTable, kind: Kind, scene: AnyScene | None) -> tuple[FloatAr
     return np.full(len(table.rows), value), []
 
 
-def _turned(head: str, kind: Kind, columns: dict[str, FloatArray], speed: FloatArray) -> tuple[str, ...]:
+def _turned(
+    head: str, kind: Kind, columns: dict[str, FloatArray], speed: FloatArray, leads: dict[str, float]
+) -> tuple[str, ...]:
     """Turn the phase of a velocity or an acceleration back to that of the displacement, and say so."""
     name, unit = split_head(head) or ("", "")
     order = _motion(kind.column(name), unit)[2]
@@ -254,7 +258,8 @@ def _turned(head: str, kind: Kind, columns: dict[str, FloatArray], speed: FloatA
     shown = format_quantity(float(speed[0]), "speed", "rpm") if np.ptp(speed) == 0 else "that of its row"
     text = f"{head} is divided by the speed{' squared' if order > 1 else ''}, {shown}"
     if phase in columns:
-        columns[phase] = columns[phase] - order * np.pi / 2
+        leads[phase] = order * np.pi / 2
+        columns[phase] = columns[phase] - leads[phase]
         text += f"; its phase is turned back by {90 * order} deg"
     return (text,)
 

@@ -16,7 +16,7 @@ odds of 100 to 1 remain.  Senses of angles that are less likely by less than `_T
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -121,13 +121,18 @@ class Reading:
 
 
 def other_readings(
-    best: Optimum, ranges: Sequence[ComparedColumn] = (), *, stated: Any = None
+    best: Optimum,
+    ranges: Sequence[ComparedColumn] = (),
+    *,
+    stated: Any = None,
+    unexplained: Collection[str] = (),
 ) -> tuple[Reading, ...]:
     """Alternative readings of the data, the most likely first.
 
     Args: `ranges`: columns compared with the scene. If the column that a reading changes is far from the
         scene in all its files, any gain suffices: a fitted loss absorbs a pressure ten times too large.
-        `stated`: scene with held inputs as stated; None: the scene of the fit.
+        `stated`: scene with held inputs as stated; None: the scene of the fit. `unexplained`: files of
+        which the fit explains nothing, so that no sense of their angles fits as well as another.
     """
     compare, far = ReadingComparison.of(best), {(each.file, each.column) for each in ranges if each.fails}
     problem = compare.problem
@@ -160,6 +165,7 @@ def other_readings(
     readings = []
     for ((joint, _), gain), where, is_named in zip(ordered, files, named, strict=True):
         senses_alone = not any(named) and gain > least and {*joint} <= {*SENSES}
+        senses_alone = senses_alone and {*where}.isdisjoint(unexplained)
         undecided = sum(named) > 1 if is_named else senses_alone
         names = " and ".join(Path(file).name for file in where)
         words: dict[str, Value] = {"files": names, "reading": words_of(joint), "gain": f"{gain:+.3g}"}

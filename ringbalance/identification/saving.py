@@ -6,6 +6,8 @@ tube; and, in [fitted], the joint uncertainty of all of these.
 
 from __future__ import annotations
 
+import cmath
+import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -85,6 +87,31 @@ def save_result(
     fitted = [each for each in result.parameters if each.name not in START]
     saved = _fitted_scene(scene, fitted=fitted, files=files, findings=findings, result=result)
     return write_whole(path, file_text(saved, to=path.parent, all_keys=True))
+
+
+def kept_start(scene: AnyScene, data: Sequence[Observations]) -> Iterator[str]:
+    """Yield a sentence for each file of trial weights that has runs without one.
+
+    What these show is that day's vibration, so that it does not replace `rotor.initial_vibration`.
+    """
+    for each in data:
+        if each.kind not in ("trial_weight", "trial_amplitude"):
+            continue
+        rotor, bare = liquid_ring_scene(scene).rotor, each.where(each.columns["unbalance"] == 0)
+        if not len(bare):
+            continue
+        measured = format_quantity(float(np.mean(bare.columns["amplitude"])), "length", "um", digits=3)
+        if "phase" in bare.columns:
+            measured = _vector_text(complex(np.mean(bare.vectors())))
+        stated = _vector_text(cmath.rect(rotor.initial_amplitude, rotor.initial_phase))
+        yield text_of("start_kept", file=PurePath(each.file).name, measured=measured, stated=stated)
+
+
+def _vector_text(vibration: complex) -> str:
+    """Text of a vibration, m zero to peak: "6 um at 40 deg"."""
+    phase = cmath.phase(vibration) % (2 * math.pi)
+    size = format_quantity(abs(vibration), "length", "um", digits=3)
+    return f"{size} at {format_quantity(phase, 'angle', 'deg', digits=3)}"
 
 
 def _fitted_scene(

@@ -246,6 +246,26 @@ def test_the_order_changes_neither_noise_nor_what_is_assumed_of_it(
                     assert value == pytest.approx(getattr(getattr(other, table), name), rel=1e-4), name
 
 
+def test_a_required_settling_time_holds_for_both(paper_scene: Scene, small: EccentricScene) -> None:
+    """The shorter of both, whichever scene states it; devices that settle later are not counted."""
+    soon, later = (paper_scene.with_values({"requirement.settling_time": time}) for time in (2.0, 3.0))
+    for pair in ((soon, later), (later, soon), (soon, paper_scene)):
+        rotor = joined_rotor(*map(rotor_of, pair))
+        assert rotor.settling_time == 2.0
+        for scene in (paper_scene, small):
+            assert balancer_of(scene).on_rotor(rotor).demands()[0].required == 2.0
+    brief = soon.with_values({"run.time_limit": "12 s"})
+    compared = compare(under_paper_law(brief), under_paper_law(brief), most=16)
+    side = compared.sides[0]
+    in_time = int(np.count_nonzero(side.outcomes.settling_time <= 2.0))
+    assert side.fraction.count == in_time < int(np.count_nonzero(side.outcomes.settled))
+    said = compared.rows()
+    assert "settle within 2 s" in said.findings[0].text
+    (cells,) = (each for each in said.tables[0].rows if str(each[0]).startswith("time to the limit"))
+    assert " to " in str(cells[1])
+    assert all("gives no controller.proportional" not in each.text for each in said.findings)
+
+
 def test_what_a_scene_requires_of_itself_is_not_asked_on_another_rotor(paper_scene: Scene) -> None:
     strict = paper_scene.with_values({"requirement.correction_moment": 1.0})
     assert len(balancer_of(strict).demands()) == 2

@@ -15,11 +15,12 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.controller.liquid_ring.linear_loop import LinearLoop
-from ringbalance.controller.liquid_ring.loop_factor import loop_margins, loop_rate
+from ringbalance.controller.liquid_ring.loop_factor import default_gain, loop_margins, loop_rate
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import with_values_at
 
 CIRCLE = np.exp(1j * np.linspace(1e-6, 2 * np.pi - 1e-6, 200_001))
 
@@ -251,6 +252,9 @@ def test_a_gain_that_the_scene_does_not_give_is_named(scene: Scene, law: Complet
     ]
     assert "gives no controller.proportional" in repr(loop)
     assert "default_gain" in {each.code for each in rb.simulate(bare).findings}
+    # A gain that a search has put in its place is no default.
+    tuned = with_values_at(bare, {"controller.proportional": 0.07e6})
+    assert not [*default_gain(tuned)]
 
 
 def test_another_controller_has_no_linear_loop(scene: Scene, law: CompleteLaw) -> None:

@@ -240,6 +240,10 @@ def test_the_fitted_scene_is_written_and_taken(run: Run, tmp_path: Path) -> None
     code, _, err = run(*words, "--save", target, "--next", "lag_angle")
     assert code == 0
     assert f"fitted scene written to {target}" in " ".join(err.split())
+    # The run without a weight is of that day: the saved scene keeps the vibration that it had.
+    kept = liquid_ring_scene(load_scene(PAPER)).rotor.initial_amplitude * 1e6
+    assert f"keeps rotor.initial_vibration, {kept:.3g} um at " in " ".join(err.split())
+    assert "without a weight trial_weight.csv has " in " ".join(err.split())
     scene = liquid_ring_scene(load_scene(target))
     assert scene.origin_of("rotor.influence_coefficient") == "measured"
     assert [each.quantity for each in scene.measured.quantities] == [

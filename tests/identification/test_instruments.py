@@ -10,6 +10,7 @@ import pytest
 
 from ringbalance.cli import main
 from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.misreadings import SENSES
 from ringbalance.identification.reading import observations_of
 from ringbalance.scene import AnyScene, bundled_scene, load_scene
 from ringbalance.scene.faults import SceneError
@@ -76,6 +77,20 @@ def test_any_quantity_of_a_vibration_is_its_displacement(
     said = assert_same(text(heads, first="", size=size, turn=turn), paper_scene).remarks
     assert any(f"phase is turned back by {turn} deg" in each for each in said) == bool(turn)
     assert any("as their units say" in each for each in said)
+
+
+@pytest.mark.parametrize(("unit", "turn"), [("um", 0), ("mm/s", 90), ("m/s^2", 180)])
+def test_a_phase_counted_against_the_rotation_is_reversed_as_the_file_has_it(
+    unit: str, turn: float, paper_scene: Scene
+) -> None:
+    """-(p + turn) in the file of a phase p of displacement; read the other way, it is p again."""
+    lines = text(f"unbalance [g*mm],angle [deg],amplitude [{unit}],phase [deg]").splitlines()
+    rows = [f"{u},{w},{a},{-(p + turn)}" for u, w, a, p in ROWS]
+    observations = read("\n".join([*lines[: -len(ROWS)], *rows]) + "\n", paper_scene)
+    reversed_phases = SENSES[0].change(observations, paper_scene)
+    assert reversed_phases is not None
+    turned = reversed_phases.columns["phase"] - np.radians([p for *_, p in ROWS])
+    assert np.exp(1j * turned) == pytest.approx(np.ones(len(ROWS)))
 
 
 def test_the_speed_of_the_file_precedes_that_of_the_scene(paper_scene: Scene) -> None:

@@ -176,6 +176,18 @@ def test_a_lag_too_near_to_its_ends_leaves_the_sense_undecided(rig_scene: Scene,
     assert told(readings(rig_scene, [counted(made, (True, False, False))])) == (alone, alone)
 
 
+def test_no_sense_of_a_file_that_nothing_explains_fits_as_well(rig_scene: Scene) -> None:
+    """The undecided rig of before: once the fit explains nothing of it, nothing fits as well."""
+    (made,) = rig(rig_scene, 0.0009, "", weights=WEIGHTS)
+    problem = problem_of(rig_scene, [made], ["influence_coefficient", "lag_angle"])
+    best = optimum(problem, np.zeros((problem.measured.size, 0)), loss="linear", starts=1)
+    both = {"phases_turned+weights_turned"}
+    assert told(other_readings(best)) == (set(), both)
+    found = other_readings(best, unexplained=[made.file])
+    assert told(found) == (set(), set())
+    assert not any("as well" in each.text for each in found)
+
+
 def test_a_factor_that_a_fit_takes_up_is_no_part_of_the_sense(paper_scene: Scene) -> None:
     """Chambers alone turned, on a device other than stated: the wrong fit pulls the held inputs far off."""
     names = ["influence_coefficient", "lag_angle", "lambda_factor", "bore", "extra_loss"]

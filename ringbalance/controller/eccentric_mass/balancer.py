@@ -233,6 +233,7 @@ class EccentricMassBalancer(Balancer):
             mass=parameters.mass,
             noise=scene.sensor.position_noise,
             limit=scene.supervisor.limit,
+            settling_time=scene.requirement.settling_time,
         )
 
     def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> EccentricMassBalancer:
@@ -282,7 +283,9 @@ class EccentricMassBalancer(Balancer):
             "supervisor.start": start,
             "run.time_limit": scene.run.time_limit + start,
         }
-        requirement = EccentricRequirement(fraction=scene.requirement.fraction)
+        requirement = EccentricRequirement(
+            fraction=scene.requirement.fraction, settling_time=rotor.settling_time
+        )
         mounted = replace(with_values_at(plant, values), requirement=requirement)
         return EccentricMassBalancer(mounted, rotors)
 

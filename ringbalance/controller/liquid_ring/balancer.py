@@ -280,6 +280,7 @@ class LiquidRingBalancer(Balancer):
             mass=None,
             noise=scene.sensor.amplitude_noise,
             limit=self.limit,
+            settling_time=self.scene.requirement.settling_time,
             runout=None if size is None else Runout(amplitude=size, phase=self.scene.sensor.runout_phase),
             limits_rotor=size is not None and self.scene.required_amplitude is not None,
         )
@@ -309,6 +310,7 @@ class LiquidRingBalancer(Balancer):
                 assumed_lag_angle=wrapped(control.assumed_lag_angle - before.lag_angle + after.lag_angle),
             ),
             requirement=RequirementSettings(
+                settling_time=rotor.settling_time,
                 fraction=self.scene.requirement.fraction,
                 residual=rotor.limit if rotor.limits_rotor else None,
             ),

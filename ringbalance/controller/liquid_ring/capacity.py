@@ -42,6 +42,8 @@ def beyond_capacity(
         values: dict[str, Value] = {**which, "count": count, "moment": pulse, "vibration": influence * pulse}
         if pulse > 0:
             yield Finding(code="capacity_creeps", values=values)
+        if len(ended) - count < scene.requirement.fraction * len(ended):
+            yield Finding(code="capacity_decides", values={**which, "count": count})
     if count := ended.count(Outcome.STALLED.value):
         further = max(running_fill(scene, model), residual)
         if further < stalled - _NOTICEABLE_FILL:

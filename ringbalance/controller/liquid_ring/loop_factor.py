@@ -45,7 +45,9 @@ from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stall
 from ringbalance.reduced_model.terms import neglected_in_injections
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import FloatArray, finite
+from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import Scene
+from ringbalance.scene.units import parse_quantity
 
 _FILL_STEP: Final = 1e-4
 """Half the distance over which the slope of a moment is taken, as a fraction of the range of fills."""
@@ -130,8 +132,10 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any] 
 
 
 def default_gain(scene: Scene) -> Iterator[Finding]:
-    """Finding that a loop is judged by a gain that its scene does not give."""
-    if scene.origin_of("controller.proportional") == "default":
+    """Finding that a loop is judged by the default gain, as its scene gives none and no search chose one."""
+    key = LIQUID_RING.tables["controller"].keys["proportional"]
+    as_default = scene.controller.proportional == parse_quantity(key.presence.default, "gain")
+    if as_default and scene.origin_of("controller.proportional") == "default":
         yield Finding(code="default_gain", values={"proportional": scene.controller.proportional})
 
 

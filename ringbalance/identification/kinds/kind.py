@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Final
 
@@ -102,6 +102,8 @@ class Observations:
     """Values by name, SI; amplitudes zero to peak. Optional columns that the file lacks are absent."""
     remarks: tuple[str, ...] = ()
     """Changes of the file's columns, a sentence each."""
+    leads: Mapping[str, float] = field(default_factory=dict)
+    """Lead of a measured velocity or acceleration over its displacement, rad, by column of the phase."""
     uncertainty: Mapping[str, FloatArray]
     """Expanded uncertainty (95 %), absolute, SI, by measured column; noise of absent columns is estimated."""
 

@@ -173,9 +173,6 @@ def run_design(
         problem = "the rotor has no unbalance that a disc could cancel"
         raise SceneError.of_file(scene.file, problem, "an amplitude above 0 of rotor.initial_vibration")
     workers = workers or os.cpu_count() or 1
-    best: RacedDesign | None = None
-    judgement: Judgement | None = None
-    effects: tuple[Effect, ...] = ()
     doubt: float | None = None
     with beside(workers + 1 if executor is None and workers > 1 else 1) as pool:
         crew = executor or pool
@@ -190,25 +187,7 @@ def run_design(
         )
         races, raced = search.races, len(search.races.candidates)
         judged = judged_designs(search)
-        promising = [each for each in _in_order(space, judged) if each.race.succeeded]
-        # If none meets the requirements, the design that serves most devices.
-        queue = promising or sorted(judged, key=lambda each: -each.race.judgement.fraction.value)[:1]
-        for _ in range(_MAX_VERDICTS):
-            if not queue:
-                break
-            best = queue.pop(0)
-            report_progress("the verdict, and what changes of it would do")
-            settings = best.race.judgement.settings
-            judge = partial(judged_design, scene, best.point, settings=settings, verdict=True)
-            effects, judgement = _effects(space, best, settings, crew, judge)
-            if judgement is not None and judgement.verdict == MET:
-                break
-            # The next one in order, or the same one larger if that is smaller.
-            larger = None
-            if judgement is not None and space.sized:
-                larger = enlarged(races, best, judgement.fraction.value)
-            if larger is not None and (not queue or larger.size < queue[0].size):
-                queue.insert(0, larger)
+        best, judgement, effects = _verdict(scene, races, judged, crew)
         if best is not None and space.sized:
             doubt = _size_half_width(best.race.judgement.fraction, growth(races, best))
     reach, smaller, ranking, held, holding = None, None, Ranking(), None, None
@@ -250,6 +229,38 @@ def run_design(
         holding=holding,
         endurance=held,
     )
+
+
+def _verdict(
+    scene: SceneFile, races: Races, judged: Sequence[RacedDesign], executor: Executor | None
+) -> tuple[RacedDesign | None, Judgement | None, tuple[Effect, ...]]:
+    """Design that meets the requirements on devices that selected none, its verdict, and effects of its keys;
+    of designs that all miss them the last that was tried, and None where there are none.
+    """
+    space = races.space
+    best: RacedDesign | None = None
+    judgement: Judgement | None = None
+    effects: tuple[Effect, ...] = ()
+    promising = [each for each in _in_order(space, judged) if each.race.succeeded]
+    # If none meets the requirements, the design that serves most devices.
+    queue = promising or sorted(judged, key=lambda each: -each.race.judgement.fraction.value)[:1]
+    for _ in range(_MAX_VERDICTS):
+        if not queue:
+            break
+        best = queue.pop(0)
+        races.report_progress("the verdict, and what changes of it would do")
+        settings = best.race.judgement.settings
+        judge = partial(judged_design, scene, best.point, settings=settings, verdict=True)
+        effects, judgement = _effects(space, best, settings, executor, judge)
+        if judgement is not None and judgement.verdict == MET:
+            break
+        # The next one in order, or the same one larger if that is smaller.
+        larger = None
+        if judgement is not None and space.sized:
+            larger = enlarged(races, best, judgement.fraction.value)
+        if larger is not None and (not queue or larger.size < queue[0].size):
+            queue.insert(0, larger)
+    return best, judgement, effects
 
 
 def _effects(

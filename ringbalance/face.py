@@ -218,7 +218,7 @@ def check_balancer(
         scene of it.
 
     Example:
-        >>> scene = rb.load_scene("driven_masses_small").with_values({"run.time_limit": "3 s"})
+        >>> scene = rb.load_scene("driven_masses_small").with_values({"run.time_limit": "5 s"})
         >>> rb.check_balancer("eccentric_mass", scene).succeeded
         True
     """

@@ -20,6 +20,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar, Union, get_args, get
 
 import numpy as np
 
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import MISSING as NO_VALUE
 from ringbalance.scene.faults import Fault, SceneError
 
@@ -144,7 +145,8 @@ class _Reader:
             return value
         if origin in (Union, UnionType):
             return self.union(arguments, value, path)
-        if origin is np.ndarray and isinstance(value, list) and all(map(_is_finite, value)):
+        # By the alias itself: of what it is an alias differs between versions of NumPy.
+        if annotation == FloatArray and isinstance(value, list) and all(map(_is_finite, value)):
             return np.array(value, dtype=np.float64)
         if origin is tuple and isinstance(value, list):
             return tuple(self.value(arguments[0], each, f"{path}.{i}") for i, each in enumerate(value))
